@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::TrySendError;
 
-use super::port::{Arrival, Inbox};
+use super::port::{Arrival, Endpoint, Inbox};
 
 /// Where arrivals go, and how many could not.
 pub(super) struct Arrivals {
@@ -28,6 +28,17 @@ impl Arrivals {
             }
             Err(TrySendError::Disconnected(_)) => self.end(),
         }
+    }
+
+    /// Reports who else is on a topic: to the log, and to the node for its diagnostics.
+    ///
+    /// - `mismatch`: why one of them does not fit.
+    pub fn report(&self, topic: String, count: usize, mismatch: Option<String>) {
+        match &mismatch {
+            Some(reason) => tracing::warn!(topic, "{reason}"),
+            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
+        }
+        self.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
     }
 
     /// As [`super::port::Port::dropped`].

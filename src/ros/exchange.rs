@@ -9,8 +9,30 @@ use std::thread::{Builder, JoinHandle};
 use super::arguments::NodeConfig;
 use super::arrivals::Arrivals;
 use super::clock::RosClock;
+use super::names::NameError;
 use super::port::{Inbox, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
+
+/// Why the node cannot speak to others.
+#[derive(Debug, thiserror::Error)]
+pub enum RosError {
+    /// a name that a rule made is none
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// ROS does not do what it is asked for
+    #[error("{call}: {reason}; {remedy}")]
+    Refused {
+        /// which call
+        call: &'static str,
+        /// what it says
+        reason: String,
+        /// what to look at
+        remedy: &'static str,
+    },
+    /// no thread is to be had
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] io::Error),
+}
 
 /// What the parts of a port share.
 pub(super) struct Exchange {

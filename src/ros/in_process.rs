@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use super::locked;
 use super::messages::{PoseStamped, WrenchStamped};
 use super::port::{Arrival, Call, Inbox, Port, Publication, Reply, SamplePort};
 use crate::clock::Clock;
@@ -62,11 +63,6 @@ pub struct OtherParticipants {
     inbox: Inbox,
 }
 
-/// What is in it is whole whoever held it.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
 /// `clock`.
 pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
@@ -115,7 +111,7 @@ impl OtherParticipants {
 
     /// What was published since it was last asked, the oldest first.
     pub fn published(&self) -> Vec<Publication> {
-        self.port.published.lock().unwrap_or_else(PoisonError::into_inner).drain(..).collect()
+        locked(&self.port.published).drain(..).collect()
     }
 
     /// Sets the time of ROS now, ns.

@@ -7,28 +7,27 @@ mod arrivals;
 pub mod clock;
 #[cfg(feature = "ros")]
 pub mod dds;
-#[cfg(any(feature = "ros", feature = "r2r"))]
 mod exchange;
-#[cfg(any(feature = "ros", feature = "r2r"))]
-mod graph;
 pub mod in_process;
 pub mod messages;
 pub mod names;
 pub mod node;
-#[cfg(any(feature = "ros", feature = "r2r"))]
 mod parameter_services;
 pub mod parameters;
 pub mod port;
 #[cfg(feature = "r2r")]
 pub mod r2r;
-#[cfg(any(feature = "ros", feature = "r2r"))]
 mod send_queue;
-#[cfg(any(feature = "ros", feature = "r2r"))]
 mod services;
-#[cfg(any(feature = "ros", feature = "r2r"))]
 mod topics;
 
 #[cfg(all(feature = "ros", not(feature = "r2r")))]
-pub use dds::{RosError, samples, start};
+pub use dds::{samples, start};
+pub use exchange::RosError;
+
+/// Locks it. What is in it is whole whoever held it: nothing of ours panics while it does.
+fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
 #[cfg(feature = "r2r")]
-pub use r2r::{RosError, samples, start};
+pub use r2r::{samples, start};

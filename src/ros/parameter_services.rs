@@ -2,9 +2,10 @@
 //!
 //! Own ones: those of the client libraries know neither ranges nor descriptions, and cannot wait for the node's answer.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
-use super::exchange::Exchange;
+use super::exchange::{Exchange, RosError};
+use super::locked;
 use super::messages::{
     self, DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, FloatingPointRange,
     GetParameterTypes, GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
@@ -42,28 +43,28 @@ type SetReply = Box<dyn FnOnce(SetResults) + Send>;
 /// Offers the services.
 ///
 /// - `announce`: publishes that a parameter has changed.
-pub(super) fn serve<E, B>(
+pub(super) fn serve<B>(
     back_end: &mut B,
     exchange: &Arc<Exchange>,
     values: &Parameters,
     announce: Announce,
-) -> Result<(), E>
+) -> Result<(), RosError>
 where
-    B: Serves<GetParameters, Error = E>
-        + Serves<GetParameterTypes, Error = E>
-        + Serves<ListParameters, Error = E>
-        + Serves<DescribeParameters, Error = E>
-        + Serves<SetParameters, Error = E>
-        + Serves<SetParametersAtomically, Error = E>,
+    B: Serves<GetParameters>
+        + Serves<GetParameterTypes>
+        + Serves<ListParameters>
+        + Serves<DescribeParameters>
+        + Serves<SetParameters>
+        + Serves<SetParametersAtomically>,
 {
     let values = Mutex::new(values.clone());
     let held = Arc::new(PublicParameters { exchange: exchange.clone(), values, announce });
     let [for_get, for_types, for_set, for_all] = std::array::from_fn(|_| held.clone());
     <B as Serves<GetParameters>>::serve(back_end, "~/get_parameters", move |request, reply| {
-        reply.send(get(&for_get.values(), &request));
+        reply.send(get(&locked(&for_get.values), &request));
     })?;
     <B as Serves<GetParameterTypes>>::serve(back_end, "~/get_parameter_types", move |request, reply| {
-        reply.send(types(&for_types.values(), &request));
+        reply.send(types(&locked(&for_types.values), &request));
     })?;
     <B as Serves<ListParameters>>::serve(back_end, "~/list_parameters", |request, reply| reply.send(list(&request)))?;
     <B as Serves<DescribeParameters>>::serve(back_end, "~/describe_parameters", |request, reply| {
@@ -81,11 +82,6 @@ where
 }
 
 impl PublicParameters {
-    fn values(&self) -> MutexGuard<'_, Parameters> {
-        // nothing of ours panics while it holds it
-        self.values.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Asks the node for one after the other, and answers when all are done.
     fn set(self: &Arc<Self>, wanted: Vec<Parameter>, answer: SetReply) {
         let wanted: Vec<_> = wanted.into_iter().take(MOST_NAMES).collect();
@@ -96,7 +92,7 @@ impl PublicParameters {
         // what is refused here needs no answer of the node
         let (name, value) = loop {
             let Some(next) = wanted.next() else { return answer(results) };
-            let checked = check(&self.values(), &next);
+            let checked = check(&locked(&self.values), &next);
             match checked {
                 Ok(value) => break (next.name, value),
                 Err(reason) => results.push(Err(reason)),
@@ -123,7 +119,7 @@ impl PublicParameters {
         let refused = if wanted.len() > MOST_NAMES {
             Some(format!("{} parameters in one call: at most {MOST_NAMES}", wanted.len()))
         } else {
-            let values = self.values();
+            let values = locked(&self.values);
             wanted.iter().find_map(|parameter| check(&values, parameter).err())
         };
         match refused {
@@ -135,7 +131,7 @@ impl PublicParameters {
     /// Keeps what the node took, and announces it.
     fn keep(&self, name: &str, value: &ParameterValue) {
         // it was checked before the node was asked
-        let _ = self.values().set_live(name, value);
+        let _ = locked(&self.values).set_live(name, value);
         (self.announce)(name, value);
     }
 }

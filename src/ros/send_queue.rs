@@ -5,8 +5,9 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 
+use super::locked;
 use super::messages::Marker;
 use super::port::Publication;
 
@@ -102,7 +103,7 @@ impl SendQueue {
 
     /// Tiles that wait now.
     pub fn tiles_waiting(&self) -> usize {
-        self.waiting().tiles.len()
+        locked(&self.waiting).tiles.len()
     }
 
     /// Sends until it is closed and empty, or closed and somebody listens too slowly.
@@ -120,7 +121,7 @@ impl SendQueue {
                 Sent::Done => {}
                 Sent::Refused => _ = count.fetch_add(1, Ordering::Relaxed),
                 Sent::Later(publication) => {
-                    let mut waiting = self.waiting();
+                    let mut waiting = locked(&self.waiting);
                     waiting.put_back(publication);
                     // who leaves does not wait for who listens slowly
                     if waiting.is_closed {
@@ -133,7 +134,7 @@ impl SendQueue {
 
     /// Has [`Self::send`] end when all is sent.
     pub fn close(&self) {
-        self.waiting().is_closed = true;
+        locked(&self.waiting).is_closed = true;
         self.more.notify_all();
     }
 
@@ -142,7 +143,7 @@ impl SendQueue {
     }
 
     fn put_message(&self, message: Outgoing) {
-        let mut waiting = self.waiting();
+        let mut waiting = locked(&self.waiting);
         if waiting.messages.len() < MOST {
             waiting.messages.push_back(message);
         } else {
@@ -153,7 +154,7 @@ impl SendQueue {
     }
 
     fn put_tile(&self, tile: Marker) {
-        let mut waiting = self.waiting();
+        let mut waiting = locked(&self.waiting);
         waiting.tiles.push_back(tile);
         if waiting.tiles.len() > MOST_TILES {
             waiting.tiles.pop_front();
@@ -164,7 +165,7 @@ impl SendQueue {
     }
 
     fn take(&self) -> Option<Outgoing> {
-        let mut waiting = self.waiting();
+        let mut waiting = locked(&self.waiting);
         loop {
             if let Some(message) = waiting.next() {
                 return Some(message);
@@ -174,11 +175,6 @@ impl SendQueue {
             }
             waiting = self.more.wait(waiting).unwrap_or_else(PoisonError::into_inner);
         }
-    }
-
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
-        // nothing of ours panics while it holds it
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

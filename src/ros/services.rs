@@ -1,40 +1,42 @@
 //! The services of docs/ros.md, but for those of parameters and the action.
 
+use std::sync::Arc;
+
+use super::exchange::{Exchange, RosError};
 use super::messages::{
     DetectFeatures, FlagFeature, ProbeFeature, ResyncMesh, RosService, SaveMesh, SetBool, Trigger, Undo, UnflagFeature,
 };
-use super::port::{Call, Reply};
+use super::port::{Arrival, Call, Reply};
 
 /// A back end that offers services of one type.
 pub(super) trait Serves<S: RosService> {
-    /// why not
-    type Error;
-
     /// Has `call` answer what is asked.
     fn serve(
         &mut self,
         name: &'static str,
         call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
-    ) -> Result<(), Self::Error>;
+    ) -> Result<(), RosError>;
 }
 
-/// Offers all; what is asked goes to `take`.
-pub(super) fn serve<E, B>(back_end: &mut B, take: impl Fn(Call) + Clone + Send + 'static) -> Result<(), E>
+/// Offers all; what is asked goes to the inbox of the node.
+pub(super) fn serve<B>(back_end: &mut B, exchange: &Arc<Exchange>) -> Result<(), RosError>
 where
-    B: Serves<FlagFeature, Error = E>
-        + Serves<UnflagFeature, Error = E>
-        + Serves<DetectFeatures, Error = E>
-        + Serves<SaveMesh, Error = E>
-        + Serves<ResyncMesh, Error = E>
-        + Serves<Undo, Error = E>
-        + Serves<Trigger, Error = E>
-        + Serves<SetBool, Error = E>
-        + Serves<ProbeFeature, Error = E>,
+    B: Serves<FlagFeature>
+        + Serves<UnflagFeature>
+        + Serves<DetectFeatures>
+        + Serves<SaveMesh>
+        + Serves<ResyncMesh>
+        + Serves<Undo>
+        + Serves<Trigger>
+        + Serves<SetBool>
+        + Serves<ProbeFeature>,
 {
     macro_rules! serve {
         ($($name:literal: $service:ident, $call:expr;)+) => {
-            $(let each = take.clone();
-            <B as Serves<$service>>::serve(back_end, $name, move |request, reply| each($call(request, reply)))?;)+
+            $(let to = exchange.clone();
+            <B as Serves<$service>>::serve(back_end, $name, move |request, reply| {
+                to.arrivals.put(Arrival::Call($call(request, reply)));
+            })?;)+
         };
     }
     serve! {

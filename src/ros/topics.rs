@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::arguments::NodeConfig;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, RosError};
 use super::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped,
     PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
@@ -57,111 +57,69 @@ pub(super) type Publisher<M> = Box<dyn Fn(M) -> Sent<M> + Send>;
 
 /// A back end that publishes messages of one type.
 pub(super) trait Publishes<M> {
-    /// why not
-    type Error;
-
     /// Announces the topic.
-    fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, Self::Error>;
+    fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError>;
 }
 
 /// A back end that listens to messages of one type.
 pub(super) trait Subscribes<M> {
-    /// why not
-    type Error;
-
     /// Listens: what comes goes to the inbox of the node.
-    fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), Self::Error>;
+    fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError>;
 }
 
-/// What is small and urgent.
-pub(super) struct UrgentTopics {
-    features: Publisher<FeatureArray>,
-    feature_markers: Publisher<MarkerArray>,
-    tip: Publisher<MarkerArray>,
-    path: Publisher<Path>,
-    probe_results: Publisher<ProbeResult>,
-    mismatch: Publisher<HapticMismatch>,
-    diagnostics: Publisher<DiagnosticArray>,
+/// Announces the topics of what is small and urgent; what sends it, which waits for nobody.
+pub(super) fn urgent<B>(back_end: &mut B) -> Result<Publisher<Publication>, RosError>
+where
+    B: Publishes<FeatureArray>
+        + Publishes<MarkerArray>
+        + Publishes<Path>
+        + Publishes<ProbeResult>
+        + Publishes<HapticMismatch>
+        + Publishes<DiagnosticArray>,
+{
+    let (features, feature_markers) = (back_end.publisher(FEATURES)?, back_end.publisher(FEATURE_MARKERS)?);
+    let (tip, path, probe_results) =
+        (back_end.publisher(TIP)?, back_end.publisher(PATH)?, back_end.publisher(PROBE_RESULTS)?);
+    let (mismatch, diagnostics) = (back_end.publisher(MISMATCH)?, back_end.publisher(DIAGNOSTICS)?);
+    Ok(Box::new(move |publication| match publication {
+        Publication::Features(message) => features(message).now(),
+        Publication::FeatureMarkers(message) => feature_markers(message).now(),
+        Publication::Tip(message) => tip(message).now(),
+        Publication::Path(message) => path(message).now(),
+        Publication::ProbeResult(message) => probe_results(*message).now(),
+        Publication::Mismatch(message) => mismatch(message).now(),
+        Publication::Diagnostics(message) => diagnostics(message).now(),
+        // what may wait has a send queue of its own
+        Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => Sent::Done,
+    }))
 }
 
-impl UrgentTopics {
-    pub fn new<E, B>(back_end: &mut B) -> Result<Self, E>
-    where
-        B: Publishes<FeatureArray, Error = E>
-            + Publishes<MarkerArray, Error = E>
-            + Publishes<Path, Error = E>
-            + Publishes<ProbeResult, Error = E>
-            + Publishes<HapticMismatch, Error = E>
-            + Publishes<DiagnosticArray, Error = E>,
-    {
-        Ok(Self {
-            features: back_end.publisher(FEATURES)?,
-            feature_markers: back_end.publisher(FEATURE_MARKERS)?,
-            tip: back_end.publisher(TIP)?,
-            path: back_end.publisher(PATH)?,
-            probe_results: back_end.publisher(PROBE_RESULTS)?,
-            mismatch: back_end.publisher(MISMATCH)?,
-            diagnostics: back_end.publisher(DIAGNOSTICS)?,
-        })
-    }
-
-    /// Sends what waits for nobody.
-    pub fn send(&self, publication: Publication) -> Sent<Publication> {
-        match publication {
-            Publication::Features(message) => (self.features)(message).now(),
-            Publication::FeatureMarkers(message) => (self.feature_markers)(message).now(),
-            Publication::Tip(message) => (self.tip)(message).now(),
-            Publication::Path(message) => (self.path)(message).now(),
-            Publication::ProbeResult(message) => (self.probe_results)(*message).now(),
-            Publication::Mismatch(message) => (self.mismatch)(message).now(),
-            Publication::Diagnostics(message) => (self.diagnostics)(message).now(),
-            // what may wait has a send queue of its own
-            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => Sent::Done,
+/// Announces the topics of what is large and may wait; what sends it, or gives back what a slow listener holds up.
+pub(super) fn mesh<B>(back_end: &mut B) -> Result<Publisher<Publication>, RosError>
+where
+    B: Publishes<Marker> + Publishes<MeshPatch> + Publishes<ProbeTouch>,
+{
+    let (tiles, patches) = (back_end.publisher(MESH)?, back_end.publisher(MESH_PATCH)?);
+    let probe_touches = back_end.publisher(PROBE_TOUCHES)?;
+    Ok(Box::new(move |publication| match publication {
+        Publication::Tile(message) => tiles(message).or_later(Publication::Tile),
+        Publication::MeshPatch(message) => patches(message).or_later(Publication::MeshPatch),
+        Publication::ProbeTouch(message) => {
+            probe_touches(*message).or_later(|message| Publication::ProbeTouch(Box::new(message)))
         }
-    }
-}
-
-/// What is large and may wait.
-pub(super) struct MeshTopics {
-    tiles: Publisher<Marker>,
-    patches: Publisher<MeshPatch>,
-    probe_touches: Publisher<ProbeTouch>,
-}
-
-impl MeshTopics {
-    pub fn new<E, B>(back_end: &mut B) -> Result<Self, E>
-    where
-        B: Publishes<Marker, Error = E> + Publishes<MeshPatch, Error = E> + Publishes<ProbeTouch, Error = E>,
-    {
-        Ok(Self {
-            tiles: back_end.publisher(MESH)?,
-            patches: back_end.publisher(MESH_PATCH)?,
-            probe_touches: back_end.publisher(PROBE_TOUCHES)?,
-        })
-    }
-
-    /// Sends, or gives back what a slow listener holds up.
-    pub fn send(&self, publication: Publication) -> Sent<Publication> {
-        match publication {
-            Publication::Tile(message) => (self.tiles)(message).or_later(Publication::Tile),
-            Publication::MeshPatch(message) => (self.patches)(message).or_later(Publication::MeshPatch),
-            Publication::ProbeTouch(message) => {
-                (self.probe_touches)(*message).or_later(|message| Publication::ProbeTouch(Box::new(message)))
-            }
-            // the others have a send queue of their own
-            _ => Sent::Done,
-        }
-    }
+        // the others have a send queue of their own
+        _ => Sent::Done,
+    }))
 }
 
 /// Everything that is listened to.
-pub(super) fn subscribe<E, B>(config: &NodeConfig, back_end: &mut B) -> Result<(), E>
+pub(super) fn subscribe<B>(config: &NodeConfig, back_end: &mut B) -> Result<(), RosError>
 where
-    B: Subscribes<WrenchStamped, Error = E>
-        + Subscribes<PoseStamped, Error = E>
-        + Subscribes<TFMessage, Error = E>
-        + Subscribes<PointStamped, Error = E>
-        + Subscribes<Clock, Error = E>,
+    B: Subscribes<WrenchStamped>
+        + Subscribes<PoseStamped>
+        + Subscribes<TFMessage>
+        + Subscribes<PointStamped>
+        + Subscribes<Clock>,
 {
     let [wrench, pose] = config.sample_topics();
     back_end.subscribe(Topic::best_effort(wrench, SAMPLES), |_, message| Arrival::Wrench(message, Instant::now()))?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use byteorder::LittleEndian;
 use ros2_client::action::{
@@ -21,9 +21,10 @@ use super::incoming::Listener;
 use super::server::SERVICE;
 use super::services::unreadable;
 use super::topics::dds_name;
-use super::{RosError, mapping};
+use super::{During, RosError, mapping};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
+use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};
 use crate::ros::services::PROBE;
@@ -82,8 +83,7 @@ pub(super) fn server(
     };
     let name = dds_name(&config.resolve(PROBE)?)?;
     let type_name = ActionTypeName::new("touchup_msgs", "Probe");
-    let server = node.create_action_server(mapping(config), &name, &type_name, qos);
-    let server = server.map_err(|error| RosError::dds("offering an action", &error))?;
+    let server = node.create_action_server(mapping(config), &name, &type_name, qos).during("offering an action")?;
     let probe = ProbeAction { server, exchange: exchange.clone(), room: room.clone(), goals: Mutex::default() };
     Ok(Box::new(ProbeListener(Arc::new(probe))))
 }
@@ -125,11 +125,6 @@ fn drain<T>(
 }
 
 impl ProbeAction {
-    fn goals(&self) -> MutexGuard<'_, Goals> {
-        // no code of ours panics while it holds it
-        self.goals.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Does it in the thread that sends.
     fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
         let probe = self.clone();
@@ -140,14 +135,14 @@ impl ProbeAction {
     fn ask(self: &Arc<Self>, request_id: RmwRequestId, request: SendGoalRequest<ProbeGoal>) {
         let id = request.goal_id;
         let is_cancelled = Arc::new(AtomicBool::new(false));
-        if !self.goals().add(id, is_cancelled.clone()) {
+        if !locked(&self.goals).add(id, is_cancelled.clone()) {
             return self.accept(request_id, id, false);
         }
         let [for_accept, for_feedback, for_result] = [self.clone(), self.clone(), self.clone()];
         let goal = Goal {
             accept: Reply::new(move |is_accepted| for_accept.accept(request_id, id, is_accepted)),
             feedback: Feedback(Box::new(move |feedback| {
-                if !for_feedback.goals().is_running(id) {
+                if !locked(&for_feedback.goals).is_running(id) {
                     return;
                 }
                 for_feedback.later(move |probe| {
@@ -164,12 +159,12 @@ impl ProbeAction {
     fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {
         let stamp = Time::now();
         if accepted {
-            if let Some(known) = self.goals().known.get_mut(&id) {
+            if let Some(known) = locked(&self.goals).known.get_mut(&id) {
                 known.status = GoalStatusEnum::Executing;
                 known.accepted = stamp;
             }
         } else {
-            self.goals().refuse(id);
+            locked(&self.goals).refuse(id);
         }
         self.later(move |probe| {
             report("send_goal", probe.server.send_goal_response(request_id, SendGoalResponse { accepted, stamp }));
@@ -183,7 +178,7 @@ impl ProbeAction {
             GoalEnd::Canceled => GoalStatusEnum::Canceled,
             GoalEnd::Aborted => GoalStatusEnum::Aborted,
         };
-        let waiting = match self.goals().known.get_mut(&id) {
+        let waiting = match locked(&self.goals).known.get_mut(&id) {
             Some(known) => {
                 known.status = status;
                 known.result = Some(response.clone());
@@ -201,7 +196,7 @@ impl ProbeAction {
 
     /// Somebody waits for the result of a goal.
     fn wait_for(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId) {
-        let (status, response) = match self.goals().known.get_mut(&id) {
+        let (status, response) = match locked(&self.goals).known.get_mut(&id) {
             Some(KnownGoal { result: None, waiting, .. }) if waiting.len() < MOST_WAITING => {
                 waiting.push(request_id);
                 return;
@@ -219,7 +214,7 @@ impl ProbeAction {
 
     /// Somebody wants goals stopped; the node does it when it can.
     fn cancel(self: &Arc<Self>, request_id: RmwRequestId, request: &CancelGoalRequest) {
-        let response = self.goals().cancel(wanted(request));
+        let response = locked(&self.goals).cancel(wanted(request));
         self.later(move |probe| {
             report("cancel_goal", probe.server.send_cancel_response(request_id, response));
             probe.publish_status();
@@ -231,7 +226,7 @@ impl ProbeAction {
             goal_info: GoalInfo { goal_id: *id, stamp: known.accepted },
             status: known.status,
         };
-        let statuses = GoalStatusArray { status_list: self.goals().known.iter().map(status).collect() };
+        let statuses = GoalStatusArray { status_list: locked(&self.goals).known.iter().map(status).collect() };
         if self.server.send_goal_statuses(statuses).is_err() {
             tracing::warn!("the states of the goals are not sent");
         }
@@ -295,7 +290,7 @@ impl Goals {
         let mut goals_canceling = Vec::new();
         for (id, known) in self.known.iter_mut().filter(|(_, known)| !known.is_over()) {
             let stamp = &known.accepted;
-            if all || (names_one && is_named(id)) || (until_ns > 0 && nanoseconds(stamp) <= until_ns) {
+            if all || (names_one && is_named(id)) || (until_ns > 0 && stamp.to_nanos() <= until_ns) {
                 known.is_cancelled.store(true, Ordering::Relaxed);
                 known.status = GoalStatusEnum::Canceling;
                 goals_canceling.push(GoalInfo { goal_id: *id, stamp: known.accepted });
@@ -309,10 +304,6 @@ impl Goals {
         };
         CancelGoalResponse { return_code, goals_canceling }
     }
-}
-
-fn nanoseconds(time: &Time) -> i64 {
-    time.to_nanos()
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use byteorder::LittleEndian;
 use ros2_client::ServiceMapping;
 use ros2_client::action::GetResultResponse;
 
+use crate::ros::locked;
 use crate::ros::messages::{
     DescribeParametersResponse, DetectFeaturesResponse, FlagFeatureResponse, GetParameterTypesResponse,
     GetParametersResponse, ListParametersResponse, ProbeFeatureResponse, ProbeResponse, ResyncMeshResponse,
@@ -64,8 +65,7 @@ impl Room {
         if bytes <= self.most {
             return answer;
         }
-        // nothing of ours panics while it holds it
-        if self.logged.lock().unwrap_or_else(PoisonError::into_inner).insert(service) {
+        if locked(&self.logged).insert(service) {
             tracing::warn!(service, bytes, most = self.most, "{TOO_LARGE}");
         }
         answer.reduce(self.most);

@@ -17,7 +17,6 @@ use super::keep_alive::{KeepAlive, LOOK_EVERY};
 use super::mapping;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
-use crate::ros::graph;
 use crate::ros::port::Arrival;
 
 /// Vendors by their number on the wire: who knows one mapping of services alone.
@@ -180,7 +179,7 @@ impl DdsGraph {
             if ours != type_name && self.reported.insert(guid) {
                 let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
                 let (name, count) = (name.clone(), self.count(topic));
-                graph::report(&self.exchange.arrivals, name, count, Some(reason));
+                self.exchange.arrivals.report(name, count, Some(reason));
             }
             return;
         }
@@ -196,7 +195,7 @@ impl DdsGraph {
             let reason = format!(
                 "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
             );
-            graph::report(&self.exchange.arrivals, service.to_owned(), 1, Some(reason));
+            self.exchange.arrivals.report(service.to_owned(), 1, Some(reason));
         }
     }
 
@@ -207,7 +206,7 @@ impl DdsGraph {
     fn report(&self, local: GUID, mismatch: Option<String>) {
         let Some((topic, others)) = self.matched.get(&local) else { return };
         let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
-        graph::report(&self.exchange.arrivals, name, others.len(), mismatch);
+        self.exchange.arrivals.report(name, others.len(), mismatch);
     }
 }
 

@@ -13,47 +13,31 @@ mod server;
 mod services;
 mod topics;
 
+use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 
 use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
-use thiserror::Error;
 
 use self::answers::Room;
 use super::arguments::NodeConfig;
-use super::exchange::{self, Exchange, Joined};
-use super::names::NameError;
+use super::exchange::{self, Exchange, Joined, RosError};
 use super::parameter_services;
 use super::parameters::{PARAMETERS, ParameterValue, Parameters};
-use super::port::{Arrival, Inbox, Port};
-use super::topics::{MeshTopics, UrgentTopics, subscribe};
+use super::port::{Inbox, Port};
+use super::topics::{mesh, subscribe, urgent};
 pub use samples::samples;
 
-/// Why the node cannot speak to others.
-#[derive(Debug, Error)]
-pub enum RosError {
-    /// a name that a rule made is none
-    #[error(transparent)]
-    Name(#[from] NameError),
-    /// DDS does not do what it is asked for
-    #[error(
-        "{call}: {reason}; is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?"
-    )]
-    Dds {
-        /// which call
-        call: &'static str,
-        /// what it says
-        reason: String,
-    },
-    /// no thread is to be had
-    #[error("cannot start a thread: {0}")]
-    Thread(#[from] std::io::Error),
+/// Says what DDS was asked for, where it refuses.
+trait During<T> {
+    fn during(self, call: &'static str) -> Result<T, RosError>;
 }
 
-impl RosError {
-    fn dds(call: &'static str, reason: &impl std::fmt::Debug) -> Self {
-        Self::Dds { call, reason: format!("{reason:?}") }
+impl<T, E: Debug> During<T> for Result<T, E> {
+    fn during(self, call: &'static str) -> Result<T, RosError> {
+        let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
+        self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
     }
 }
 
@@ -87,12 +71,11 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (context, mut node) = join(config, options)?;
     let mut graph = graph::DdsGraph::new(&context, &exchange, config);
     let mut topics = topics::DdsTopics::new(config, &mut node, &mut graph, &exchange);
-    let (mesh, urgent) = (MeshTopics::new(&mut topics)?, UrgentTopics::new(&mut topics)?);
+    let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
     subscribe(config, &mut topics)?;
     let mut listeners = topics.listeners;
     let mut services = services::DdsServices::new(config, &context, &mut node, &exchange, &room);
-    let arrivals = exchange.clone();
-    super::services::serve(&mut services, move |call| arrivals.arrivals.put(Arrival::Call(call)))?;
+    super::services::serve(&mut services, &exchange)?;
     services.whole_names()?.into_iter().for_each(|name| graph.serve(name));
     let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
     let announce = announcing.clone();
@@ -109,7 +92,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     listeners.push(Box::new(graph));
     let (waker, listening) = incoming::listen(listeners, exchange.clone())?;
     let mut threads = vec![listening];
-    threads.extend(exchange.senders(move |one| urgent.send(one), move |one| mesh.send(one))?);
+    threads.extend(exchange.senders(urgent, mesh)?);
     let connection = DdsConnection { exchange: exchange.clone(), waker, threads, _node: node };
     Ok(Arc::new(Joined { exchange, _connection: connection }))
 }
@@ -143,12 +126,10 @@ fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), Ro
     if config.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
     }
-    let participant = builder.build().map_err(|error| RosError::dds("joining the domain", &error))?;
-    let context = Context::from_domain_participant(participant);
-    let context = context.map_err(|error| RosError::dds("joining the graph", &error))?;
+    let participant = builder.build().during("joining the domain")?;
+    let context = Context::from_domain_participant(participant).during("joining the graph")?;
     let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
-    let name =
-        NodeName::new(namespace, &config.place.node).map_err(|error| RosError::dds("naming the node", &error))?;
-    let node = context.new_node(name, options).map_err(|error| RosError::dds("making the node", &error))?;
+    let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
+    let node = context.new_node(name, options).during("making the node")?;
     Ok((context, node))
 }

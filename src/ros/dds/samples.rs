@@ -8,7 +8,7 @@ use ros2_client::dds::rustdds::{
 use ros2_client::{Node, NodeOptions, Publisher};
 
 use super::topics::{BEST_EFFORT, keep, make_topic};
-use super::{RosError, join};
+use super::{During, RosError, join};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::messages::{PoseStamped, RosMessage, WrenchStamped};
 use crate::ros::port::SamplePort;
@@ -41,7 +41,7 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
 fn publisher<M: RosMessage>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
     let qos = keep(BEST_EFFORT, DEPTH);
     let topic = make_topic::<M>(node, &config.resolve(name)?, &qos)?;
-    node.create_publisher(&topic, Some(qos)).map_err(|error| RosError::dds("publishing a topic", &error))
+    node.create_publisher(&topic, Some(qos)).during("publishing a topic")
 }
 
 fn send<M: RosMessage>(publisher: &Publisher<M>, message: M) -> bool {

@@ -10,7 +10,7 @@ use ros2_client::{Context, Node, Publisher, ReadResult, RmwRequestId, ServiceMap
 use serde::{Deserialize, Serialize};
 
 use super::topics::dds_name;
-use super::{RosError, mapping};
+use super::{During, RosError, mapping};
 use crate::ros::arguments::NodeConfig;
 
 /// As ROS 2 has it for services: nothing is lost, calls wait for each other.
@@ -57,20 +57,17 @@ where
         if mapping != ServiceMapping::Cyclone {
             let type_name = ServiceTypeName::new(package, type_name);
             let server = node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
-            return server.map(Self::Enhanced).map_err(|error| RosError::dds("offering a service", &error));
+            return server.map(Self::Enhanced).during("offering a service");
         }
         let topic = |name: String, part: &str| {
             let type_name = format!("{package}::srv::dds_::{type_name}_{part}_");
             let qos = QosPolicies::from(&SERVICE);
-            let topic = context.domain_participant().create_topic(name, type_name, &qos, TopicKind::NoKey);
-            topic.map_err(|error| RosError::dds("making a topic", &error))
+            context.domain_participant().create_topic(name, type_name, &qos, TopicKind::NoKey).during("making a topic")
         };
         let requests = topic(format!("rq{whole}Request"), "Request")?;
         let answers = topic(format!("rr{whole}Reply"), "Response")?;
-        let requests = node.create_subscription(&requests, Some(SERVICE));
-        let requests = requests.map_err(|error| RosError::dds("offering a service", &error))?;
-        let answers = node.create_publisher(&answers, Some(SERVICE));
-        let answers = answers.map_err(|error| RosError::dds("offering a service", &error))?;
+        let requests = node.create_subscription(&requests, Some(SERVICE)).during("offering a service")?;
+        let answers = node.create_publisher(&answers, Some(SERVICE)).during("offering a service")?;
         Ok(Self::Cyclone(requests, answers))
     }
 }

@@ -91,8 +91,6 @@ impl<S> Serves<S> for DdsServices<'_>
 where
     S: RosService<Request: ros2_client::Message, Response: Shrinkable>,
 {
-    type Error = RosError;
-
     fn serve(
         &mut self,
         name: &'static str,

@@ -8,9 +8,9 @@ use ros2_client::dds::rustdds::{self, QosPolicyBuilder, TopicDescription, TopicK
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, WriteError};
 
-use super::RosError;
 use super::graph::DdsGraph;
 use super::incoming::{HeardTopic, LastNumbers, Listener};
+use super::{During, RosError};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
 use crate::ros::messages::RosMessage;
@@ -75,16 +75,13 @@ impl<'a> DdsTopics<'a> {
 }
 
 impl<M: RosMessage> Publishes<M> for DdsTopics<'_> {
-    type Error = RosError;
-
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
         let profile = profile(topic);
         let mut announced = self.announce::<M>(topic.name, &profile)?;
         if let Some(most) = limit(topic) {
             announced = limited(&announced, most)?;
         }
-        let publisher = self.node.create_publisher::<M>(&announced, Some(profile));
-        let publisher = publisher.map_err(|error| RosError::dds("publishing a topic", &error))?;
+        let publisher = self.node.create_publisher::<M>(&announced, Some(profile)).during("publishing a topic")?;
         self.graph.add(publisher.guid(), &announced);
         if topic == MESH {
             self.graph.add_tiles(publisher.guid());
@@ -101,13 +98,11 @@ impl<M: RosMessage> Publishes<M> for DdsTopics<'_> {
 }
 
 impl<M: RosMessage> Subscribes<M> for DdsTopics<'_> {
-    type Error = RosError;
-
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
         let profile = profile(topic);
         let announced = self.announce::<M>(topic.name, &profile)?;
         let subscription = self.node.create_subscription::<M>(&announced, Some(profile));
-        let subscription = subscription.map_err(|error| RosError::dds("subscribing to a topic", &error))?;
+        let subscription = subscription.during("subscribing to a topic")?;
         self.graph.add(subscription.guid(), &announced);
         let counter = ["wrench", "pose"].iter().position(|sample| topic.name.ends_with(sample));
         let (name, exchange, numbers) = (topic.name, self.exchange.clone(), LastNumbers::default());
@@ -121,9 +116,9 @@ fn limited(topic: &rustdds::Topic, most: usize) -> Result<rustdds::Topic, RosErr
     let most = most as i32;
     let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
     let qos = topic.qos().modify_by(&QosPolicyBuilder::new().resource_limits(limits).build());
-    let participant = topic.participant().ok_or_else(|| RosError::dds("making a topic", &"the participant is gone"))?;
+    let participant = topic.participant().ok_or("the participant is gone").during("making a topic")?;
     let limited = participant.create_topic(topic.name(), topic.get_type().name().to_owned(), &qos, TopicKind::NoKey);
-    limited.map_err(|error| RosError::dds("making a topic", &error))
+    limited.during("making a topic")
 }
 
 /// - `whole`: absolute, remapped.
@@ -134,11 +129,10 @@ pub(super) fn make_topic<M: RosMessage>(
 ) -> Result<rustdds::Topic, RosError> {
     let mut parts = M::TYPE_NAME.split('/');
     let (package, type_name) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
-    let topic = node.create_topic(&dds_name(whole)?, MessageTypeName::new(package, type_name), qos);
-    topic.map_err(|error| RosError::dds("making a topic", &error))
+    node.create_topic(&dds_name(whole)?, MessageTypeName::new(package, type_name), qos).during("making a topic")
 }
 
 /// The name as ros2-client has it.
 pub(super) fn dds_name(whole: &str) -> Result<Name, RosError> {
-    Name::parse(whole).map_err(|error| RosError::dds("naming a topic or service", &error))
+    Name::parse(whole).during("naming a topic or service")
 }

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use nalgebra::Point3;
 
@@ -11,6 +11,7 @@ use super::edits::Edits;
 use crate::clock::{Clock, Working};
 use crate::mesh::{MeshError, TriMesh, VertexId};
 use crate::reconstruct::Support;
+use crate::ros::locked;
 
 /// Corners of a face that is not there.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
@@ -223,11 +224,6 @@ impl MeshReplica {
             !is_there
         });
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // what is in it is whole whoever held it
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A state of the mesh that no longer changes. Time waits for who takes it up.

@@ -2,10 +2,11 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use super::channels::ViewInput;
 use super::replica::MeshReplica;
+use crate::ros::locked;
 use crate::ros::parameters::Parameters;
 
 /// Read by all threads.
@@ -39,17 +40,12 @@ impl Shared {
 
     /// As they are now.
     pub fn parameters(&self) -> Arc<Parameters> {
-        Arc::clone(&self.lock())
+        Arc::clone(&locked(&self.parameters))
     }
 
     /// Sets them.
     pub fn set_parameters(&self, parameters: Parameters) {
-        *self.lock() = Arc::new(parameters);
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Arc<Parameters>> {
-        // what is in it is whole whoever held it
-        self.parameters.lock().unwrap_or_else(PoisonError::into_inner)
+        *locked(&self.parameters) = Arc::new(parameters);
     }
 
     /// So many tiles are still to be sent.

@@ -1,7 +1,7 @@
 //! The action `~/probe`: goals, their feedback, and that somebody wants them stopped.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use futures::{FutureExt, Stream, StreamExt};
 use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, Node};
@@ -10,6 +10,7 @@ use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
 use super::{During, PollSource, RosError, source};
 use crate::ros::exchange::Exchange;
+use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
 use crate::ros::services::PROBE;
@@ -121,9 +122,4 @@ fn take_cancels(running: &mut Vec<Cancels>) -> bool {
     }
     running.retain(|cancels| !cancels.handle.is_over.load(Ordering::Relaxed));
     has_come
-}
-
-fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    // nothing of ours panics while it holds it
-    of.lock().unwrap_or_else(PoisonError::into_inner)
 }

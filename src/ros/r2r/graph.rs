@@ -7,7 +7,6 @@ use r2r::qos::{DurabilityPolicy, QosProfile, ReliabilityPolicy};
 use r2r::{Context, Node, Publisher, WrappedTypesupport};
 
 use crate::ros::exchange::Exchange;
-use crate::ros::graph;
 use crate::ros::port::Arrival;
 
 /// How often it is asked.
@@ -96,7 +95,7 @@ impl WatchedTopic {
             exchange.arrivals.put(Arrival::Viewer);
         }
         self.reported = seen.clone();
-        graph::report(&exchange.arrivals, topic, seen.0, seen.1);
+        exchange.arrivals.report(topic, seen.0, seen.1);
     }
 }
 

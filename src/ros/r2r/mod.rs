@@ -15,7 +15,7 @@ mod services;
 mod stand_in;
 mod topics;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -24,40 +24,17 @@ use futures::{FutureExt, Stream, StreamExt};
 use r2r::{std_srvs, touchup_msgs};
 #[cfg(feature = "r2r-check")]
 use stand_in::{std_srvs, touchup_msgs};
-use thiserror::Error;
 
 use super::arguments::NodeConfig;
-use super::exchange::{self, Exchange, Joined};
+use super::exchange::{self, Exchange, Joined, RosError};
+use super::locked;
 use super::messages::{Parameter, ParameterEvent, Time};
-use super::names::NameError;
 use super::parameter_services::{self, raw};
 use super::parameters::ParameterValue;
 use super::port::{Arrival, Inbox, Port};
-use super::topics::{MeshTopics, UrgentTopics, subscribe};
+use super::topics::{mesh, subscribe, urgent};
 use convert::Convert;
 pub use samples::samples;
-
-/// Why the node cannot speak to others.
-#[derive(Debug, Error)]
-pub enum RosError {
-    /// a name that a rule made is none
-    #[error(transparent)]
-    Name(#[from] NameError),
-    /// ROS does not start
-    #[error("ROS does not start: {0}; is RMW_IMPLEMENTATION one that is installed?")]
-    Start(String),
-    /// rcl does not do what it is asked for
-    #[error("{call}: {reason}; is the workspace sourced that has touchup_msgs?")]
-    Rcl {
-        /// for what
-        call: &'static str,
-        /// what it says
-        reason: String,
-    },
-    /// no thread is to be had
-    #[error("cannot start a thread: {0}")]
-    Thread(#[from] std::io::Error),
-}
 
 /// Says what rcl was asked for, where it refuses.
 trait During<T> {
@@ -66,7 +43,8 @@ trait During<T> {
 
 impl<T> During<T> for r2r::Result<T> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
-        self.map_err(|error| RosError::Rcl { call, reason: error.to_string() })
+        let remedy = "is the workspace sourced that has touchup_msgs?";
+        self.map_err(|error| RosError::Refused { call, reason: error.to_string(), remedy })
     }
 }
 
@@ -115,20 +93,19 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let mut node = node.during("making the node")?;
     let mut graph = graph::R2rGraph::new(context);
     let mut topics = topics::R2rTopics::new(config, &mut node, &mut graph, &exchange);
-    let (mesh, urgent) = (MeshTopics::new(&mut topics)?, UrgentTopics::new(&mut topics)?);
+    let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
     subscribe(config, &mut topics)?;
     let mut sources = topics.sources;
     let announce = announce(&mut node, config.place.full_name(), &exchange)?;
     let mut services = services::R2rServices::new(&mut node, &exchange);
-    let arrivals = exchange.clone();
-    super::services::serve(&mut services, move |call| arrivals.arrivals.put(Arrival::Call(call)))?;
+    super::services::serve(&mut services, &exchange)?;
     parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
     sources.append(&mut services.sources);
     sources.extend(action::server(&mut node, &exchange)?);
     let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };
     let spinning = exchange.thread("touchup-spin", move |exchange| spin(node, sources, graph, exchange))?;
     connection.spinning = Some(spinning);
-    connection.sending.extend(exchange.senders(move |one| urgent.send(one), move |one| mesh.send(one))?);
+    connection.sending.extend(exchange.senders(urgent, mesh)?);
     Ok(Arc::new(Joined { exchange, _connection: connection }))
 }
 
@@ -150,8 +127,7 @@ fn announce(
         };
         let events = events.clone();
         exchange.urgent.answer(Box::new(move || {
-            // nothing of ours panics while it holds it
-            if let Err(error) = events.lock().unwrap_or_else(PoisonError::into_inner).publish(&event.theirs()) {
+            if let Err(error) = locked(&events).publish(&event.theirs()) {
                 tracing::warn!(%error, "a change of a parameter is not announced");
             }
         }));
@@ -160,13 +136,15 @@ fn announce(
 
 /// The context of the process. r2r panics where rcl refuses the command line or the environment.
 fn context() -> Result<r2r::Context, RosError> {
-    match std::panic::catch_unwind(r2r::Context::create) {
-        Ok(context) => context.map_err(|error| RosError::Start(error.to_string())),
+    let created = match std::panic::catch_unwind(r2r::Context::create) {
+        Ok(context) => context.map_err(|error| error.to_string()),
         Err(panic) => {
             let said = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref().copied());
-            Err(RosError::Start(said.unwrap_or("rcl_init failed").to_owned()))
+            Err(said.unwrap_or("rcl_init failed").to_owned())
         }
-    }
+    };
+    let remedy = "is RMW_IMPLEMENTATION one that is installed?";
+    created.map_err(|reason| RosError::Refused { call: "ROS does not start", reason, remedy })
 }
 
 /// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.

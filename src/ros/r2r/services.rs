@@ -25,8 +25,6 @@ impl<'a> R2rServices<'a> {
 }
 
 impl<S: R2rService> Serves<S> for R2rServices<'_> {
-    type Error = RosError;
-
     fn serve(
         &mut self,
         name: &'static str,

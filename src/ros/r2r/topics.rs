@@ -45,8 +45,6 @@ impl<M> Publishes<M> for R2rTopics<'_>
 where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + 'static>,
 {
-    type Error = RosError;
-
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
         let publisher = self.node.create_publisher::<M::Theirs>(topic.name, profile(topic));
         let publisher = publisher.during("publishing a topic")?;
@@ -65,16 +63,15 @@ impl<M> Subscribes<M> for R2rTopics<'_>
 where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + Send + 'static>,
 {
-    type Error = RosError;
-
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
         let profile = profile(topic);
         let messages = self.node.subscribe::<M::Theirs>(topic.name, profile.clone());
         let messages = messages.during("subscribing to a topic")?;
         self.graph.watch_senders(self.config.resolve(topic.name)?, M::TYPE_NAME, profile);
         let exchange = self.exchange.clone();
-        let take = move |message| exchange.arrivals.put(arrival(&exchange, M::ours(message)));
-        self.sources.push(source(messages, take));
+        self.sources.push(source(messages, move |message| {
+            exchange.arrivals.put(arrival(&exchange, M::ours(message)));
+        }));
         Ok(())
     }
 }

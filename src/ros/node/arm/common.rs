@@ -1,10 +1,11 @@
 //! What the thread of the arm and the others know of each other.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::probing::arm::{ArmError, ArmState, Safety};
 use crate::probing::execute::Cell;
+use crate::ros::locked;
 use crate::ros::messages::{ProbeResult, TriggerResponse};
 
 /// Read and written by any thread.
@@ -69,14 +70,9 @@ impl Common {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, StateSeen> {
-        // what is in it is whole whoever held it
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// A state came. A stop in it is one until somebody has looked, also when nobody moved the arm.
     pub fn see(&self, state: &ArmState) {
-        let mut seen = self.lock();
+        let mut seen = locked(&self.seen);
         (seen.last, seen.fault) = (Some(*state), None);
         if state.safety != Safety::Normal {
             seen.stop.get_or_insert_with(|| state.safety.to_string());
@@ -85,12 +81,12 @@ impl Common {
 
     /// The last one.
     pub fn last(&self) -> Option<ArmState> {
-        self.lock().last
+        locked(&self.seen).last
     }
 
     /// None came; whether that is new.
     pub fn miss(&self, error: &ArmError) -> bool {
-        let mut seen = self.lock();
+        let mut seen = locked(&self.seen);
         if let ArmError::Stopped { .. } | ArmError::ProgramEnded | ArmError::Client { .. } = error {
             seen.stop.get_or_insert_with(|| error.to_string());
         }
@@ -99,17 +95,17 @@ impl Common {
 
     /// None will come.
     pub fn fail(&self, why: &str) {
-        self.lock().fault = Some(why.to_owned());
+        locked(&self.seen).fault = Some(why.to_owned());
     }
 
     /// The arm was stopped while it moved.
     pub fn stop(&self, why: &str) {
-        self.lock().stop = Some(why.to_owned());
+        locked(&self.seen).stop = Some(why.to_owned());
     }
 
     /// Somebody has looked.
     pub fn recovered(&self) {
-        let mut seen = self.lock();
+        let mut seen = locked(&self.seen);
         (seen.stop, seen.fault) = (None, None);
     }
 
@@ -118,7 +114,7 @@ impl Common {
     /// # Errors
     /// In words.
     pub fn ready(&self) -> Result<(), String> {
-        let seen = self.lock();
+        let seen = locked(&self.seen);
         match (&seen.fault, &seen.stop, seen.last.map(|state| state.safety)) {
             (Some(error), ..) => Err(error.clone()),
             (None, _, Some(safety)) if safety != Safety::Normal => Err(safety.to_string()),
