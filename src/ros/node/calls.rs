@@ -10,7 +10,7 @@ use tracing::warn;
 
 use super::arm::ArmInput;
 use super::channels::{FeatureInput, FlaggedPlace, ViewInput};
-use super::convert::{header, stamp_ns};
+use super::convert::{header, point_of, stamp_ns};
 use super::error::NodeError;
 use super::feature_messages::KIND_NAMES;
 use super::refinement::RefinementWorker;
@@ -54,7 +54,7 @@ impl RefinementWorker {
             Call::Reset(reply) => reply.send(self.reset()),
             Call::Pause(request, reply) => {
                 self.is_paused = request.data;
-                self.arm.iter().for_each(|arm| arm.pause(request.data));
+                self.arm.iter().for_each(|arm| arm.common.pause(request.data));
                 let message = if request.data { "paused: samples are passed over" } else { "samples are taken" };
                 reply.send(SetBoolResponse { success: true, message: message.to_owned() });
             }
@@ -95,7 +95,7 @@ impl RefinementWorker {
             stamp_ns => stamp_ns,
         };
         let frame = self.resolver.object_from(&clicked.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
-        let point = frame * Point3::new(clicked.point.x, clicked.point.y, clicked.point.z);
+        let point = frame * point_of(&clicked.point);
         let is_sound = point.coords.iter().all(|x| x.abs() <= crate::stylus::LARGEST_POSITION);
         is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
@@ -178,7 +178,7 @@ impl RefinementWorker {
                 warn!(%error, "the session before was not written whole");
             }
         };
-        self.side_work.begin("ending", end).map_err(NodeError::no_thread)?;
+        self.side_work.begin("ending", end)?;
         self.fault = None;
         let replica = Box::new(MeshVersion::of(&self.setup.scan.0, &name));
         // both take these however much they have to do
@@ -239,7 +239,7 @@ impl RefinementWorker {
         let mut parameters = (*self.setup.shared.parameters()).clone();
         parameters.set_live(name, value).map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
-        self.arm.iter().for_each(|arm| arm.allow_motion(parameters.bool("allow_motion")));
+        self.arm.iter().for_each(|arm| arm.common.allow_motion(parameters.bool("allow_motion")));
         self.setup.shared.set_parameters(parameters);
         self.setup.shared.offer(&self.view, ViewInput::Parameters);
         Ok(())

@@ -1,17 +1,16 @@
 //! What came of a probing, as messages.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::probing::arm::{
     ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord,
 };
 use crate::probing::execute::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::messages::{
-    Feature, Header, Point, Pose, ProbeResponse, ProbeResult, ProbeTouch, Quaternion, Time, Vector3 as Vector3Msg,
-    Wrench as WrenchMsg,
+    Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time, Vector3 as Vector3Msg, Wrench as WrenchMsg,
 };
 use crate::ros::node::channels::ProbeTarget;
-use crate::ros::node::convert::{NO_VECTOR, point, time, vector};
+use crate::ros::node::convert::{NO_VECTOR, point, pose, time, vector, vector_of};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
 
 /// Why nothing is probed where all that is flagged was asked for.
@@ -21,14 +20,7 @@ const NOWHERE: Point = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
 /// Not begun, and nothing is known of it.
 pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
     let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
-    ProbeResult {
-        id,
-        code,
-        message: why.to_owned(),
-        feature: flagged(id, Feature::KIND_UNKNOWN, &nowhere, f64::NAN),
-        uncertainty: f64::NAN,
-        ..ProbeResult::default()
-    }
+    refused(&ProbeTarget { id, kind: None, place: nowhere, radius: f64::NAN }, code, why.to_owned())
 }
 
 /// Not begun.
@@ -220,29 +212,22 @@ fn touch_of(
     let pose_ot = cell.pose_bo.inverse() * record.target.standoff_bt;
     let with = curve_of(base, record);
     let with = ProbeTouch { verdict: verdict_of(&record.outcome), ..with };
-    match (&record.outcome, touch.centre) {
+    let (at, stamp_ns, touch) = match (&record.outcome, touch.centre) {
         (TouchOutcome::Contact { onset, force_b, .. }, Some(centre)) => {
             // the part pushes along its normal, but for friction
             let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-approach);
-            let measured_ns = record.curve_ns + (onset_at(record, onset.travel) * 1e9) as i64;
             let touch = ProbeTouch {
-                pose: pose_at(&centre, &pose_ot),
                 contact: point(&(centre - normal * radius)),
                 contact_std: onset.sigma,
                 normal: vector(&normal),
                 ..with
             };
-            (time(measured_ns + offset_ns), touch)
+            (centre, record.curve_ns + (onset_at(record, onset.travel) * 1e9) as i64, touch)
         }
-        (TouchOutcome::Miss { travel }, _) => {
-            let end = touch.planned.from + approach * *travel;
-            (time(record.stamps_ns[1] + offset_ns), ProbeTouch { pose: pose_at(&end, &pose_ot), ..with })
-        }
-        _ => {
-            let touch = ProbeTouch { pose: pose_at(&touch.planned.from, &pose_ot), ..with };
-            (time(record.stamps_ns[1] + offset_ns), touch)
-        }
-    }
+        (TouchOutcome::Miss { travel }, _) => (touch.planned.from + approach * *travel, record.stamps_ns[1], with),
+        _ => (touch.planned.from, record.stamps_ns[1], with),
+    };
+    (time(stamp_ns + offset_ns), ProbeTouch { pose: pose(&at, &pose_ot.rotation), ..touch })
 }
 
 fn verdict_of(outcome: &TouchOutcome) -> u8 {
@@ -259,11 +244,6 @@ fn verdict_of(outcome: &TouchOutcome) -> u8 {
     }
 }
 
-fn pose_at(place: &Point3<f64>, pose_ot: &Isometry3<f64>) -> Pose {
-    let q = pose_ot.rotation;
-    Pose { position: point(place), orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w } }
-}
-
 /// When a travel is reached first, s from the beginning of the curve.
 fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
     record.curve.iter().find(|m| m.travel >= travel).map_or(0.0, |m| m.t)
@@ -275,7 +255,7 @@ fn curve_of(touch: ProbeTouch, record: &TouchRecord) -> ProbeTouch {
     let row =
         |value: fn(&crate::probing::arm::TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
     // its size is known, and that the part pushes back
-    let most = Vector3::from([touch.approach.x, touch.approach.y, touch.approach.z]) * -record.peak_force;
+    let most = vector_of(&touch.approach) * -record.peak_force;
     ProbeTouch {
         speed: record.speed,
         peak_wrench: WrenchMsg { force: vector(&most), torque: Vector3Msg::default() },

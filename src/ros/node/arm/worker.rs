@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tracing::{info, warn};
 
@@ -13,23 +13,21 @@ use super::answer::{not_probed, planned as planned_result, refused, response_of,
 use super::common::Common;
 use super::pace::Paced;
 use super::request::Wanted;
-use super::world::{ArmWorld, ask_mesh, publish};
+use super::world::{ArmLink, ArmWorld, GoalWatcher, ask_mesh, is_cancelled};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
-use crate::probing::execute::{Cell, Ending, Flag, Phase, ProbeParams, Prober, StaticWorld, plan};
+use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, plan};
 use crate::ros::messages::{
-    Header, Path as PathMsg, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
-    ProbeSettings, TriggerResponse,
+    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse,
+    ProbeResult, ProbeSettings, TriggerResponse,
 };
 use crate::ros::node::channels::{ArmMeasurement, FeatureInput, ProbeTarget};
-use crate::ros::node::convert::header;
+use crate::ros::node::convert::{header, point};
 use crate::ros::node::error::NodeError;
-use crate::ros::node::frame_resolver::CELL;
 use crate::ros::node::setup::Setup;
-use crate::ros::node::shared::Shared;
 use crate::ros::node::side_work::begin;
-use crate::ros::port::{Feedback, Goal, GoalEnd, Port, Publication, Reply, SamplePort};
+use crate::ros::port::{Goal, GoalEnd, Port, Publication, Reply, SamplePort};
 use crate::scene::simulated_arm;
 use crate::sim::{MeshSurface, SimArm};
 
@@ -105,7 +103,8 @@ pub struct ArmOfNode {
 #[derive(Debug)]
 pub struct ArmHandle {
     inputs: SyncSender<ArmOrder>,
-    common: Arc<Common>,
+    /// what it and the others know of each other
+    pub common: Arc<Common>,
     cell: Cell,
 }
 
@@ -145,39 +144,19 @@ impl ArmHandle {
     pub fn state(&self) -> TriggerResponse {
         self.common.state(&self.cell)
     }
-
-    /// `~/pause`
-    pub fn pause(&self, is_paused: bool) {
-        self.common.pause(is_paused);
-    }
-
-    /// The parameter `allow_motion`.
-    pub fn allow_motion(&self, is_allowed: bool) {
-        self.common.allow_motion(is_allowed);
-    }
 }
 
 /// What the thread works with.
 struct ArmWorker {
-    setup: Arc<Setup>,
-    shared: Arc<Shared>,
+    link: ArmLink,
     port: Arc<dyn Port>,
-    samples: Box<dyn SamplePort>,
     features: SyncSender<FeatureInput>,
     cell: Cell,
     params: ProbeParams,
     inputs: Receiver<ArmOrder>,
-    common: Arc<Common>,
-    /// from the arm's clock to that of ROS, ns
-    offset_ns: Option<i64>,
     /// the time of ROS when the last state came, ns
     ros_ns: i64,
-    /// when the order at hand was taken up
-    begun: Instant,
 }
-
-/// Who follows a goal: the feedback, and whether it is to end.
-type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
 
 /// Starts the thread of an arm.
 ///
@@ -195,20 +174,8 @@ pub fn start(
     common.allow_motion(setup.shared.parameters().bool("allow_motion"));
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
-    let mut worker = ArmWorker {
-        setup: Arc::clone(setup),
-        shared: Arc::clone(&setup.shared),
-        port: Arc::clone(port),
-        samples,
-        features,
-        cell,
-        params,
-        inputs,
-        common,
-        offset_ns: None,
-        ros_ns: i64::MIN,
-        begun: setup.clock.now(),
-    };
+    let link = ArmLink { setup: Arc::clone(setup), samples, common, offset_ns: None, begun: setup.clock.now() };
+    let mut worker = ArmWorker { link, port: Arc::clone(port), features, cell, params, inputs, ros_ns: i64::MIN };
     let run = move || {
         match kind {
             ArmKind::Real(mut arm) => worker.run(&mut *arm),
@@ -216,7 +183,7 @@ pub fn start(
         }
         worker.refuse_the_rest();
     };
-    let thread = begin(&setup.clock, "arm", run).map_err(NodeError::no_thread)?;
+    let thread = begin(&setup.clock, "arm", run)?;
     Ok((handle, thread))
 }
 
@@ -227,19 +194,19 @@ impl ArmWorker {
             Err(error) => return self.fail(&format!("the simulated arm has no part to touch: {error}")),
         };
         match SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part)) {
-            Ok(arm) => self.run(&mut Paced::new(self.setup.clock.clone(), arm)),
+            Ok(arm) => self.run(&mut Paced::new(self.link.setup.clock.clone(), arm)),
             Err(error) => self.fail(&format!("the simulated arm cannot begin: {error}")),
         }
     }
 
     fn fail(&self, why: &str) {
         warn!("{why}");
-        self.common.fail(why);
+        self.link.common.fail(why);
     }
 
     /// Streams, and does what it is asked, until the node ends.
     fn run(&mut self, arm: &mut dyn Arm) {
-        while !self.common.is_ending() {
+        while !self.link.common.is_ending() {
             self.see_next(arm);
             match self.inputs.try_recv() {
                 Ok(order) => self.take(order, arm),
@@ -256,44 +223,39 @@ impl ArmWorker {
         }
     }
 
-    /// Frame of the poses: the base of the arm, where the scene says where the scan lies in it.
-    fn base(&self) -> &str {
-        if self.setup.scene.scan_to_space.is_some() { CELL } else { &self.shared.frame }
-    }
-
     /// Takes the next state of an arm that nobody moves.
     fn see_next(&mut self, arm: &mut dyn Arm) {
         let state = match arm.next_state() {
             Ok(state) => state,
             Err(error) => {
-                if self.common.miss(&error) {
+                if self.link.common.miss(&error) {
                     warn!(%error, "the arm");
                 }
-                return self.setup.clock.sleep(LOST);
+                return self.link.setup.clock.sleep(LOST);
             }
         };
-        self.common.see(&state);
+        self.link.common.see(&state);
         let now_ns = self.port.now_ns();
         let off = now_ns - state.stamp_ns;
-        let followed = match self.offset_ns {
+        let followed = match self.link.offset_ns {
             // a simulated time that has not come yet, or stands still, says nothing of the arm's clock
             Some(offset) if now_ns == self.ros_ns => offset,
             Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => offset + (off - offset) / FOLLOW,
             _ => off,
         };
         self.ros_ns = now_ns;
-        self.offset_ns = Some(followed);
-        publish(&*self.samples, self.base(), &self.setup.tool, &state, followed);
+        self.link.offset_ns = Some(followed);
+        self.link.publish(&state);
     }
 
     /// Waits for what another thread makes ready, while the arm's states go on.
     fn wait<T>(&mut self, arm: &mut dyn Arm, ready: &Receiver<T>) -> Option<T> {
-        let deadline = self.setup.clock.now() + WAIT;
+        let deadline = self.link.setup.clock.now() + WAIT;
         loop {
             match ready.try_recv() {
                 Ok(made) => return Some(made),
                 Err(TryRecvError::Disconnected) => return None,
-                Err(TryRecvError::Empty) if self.setup.clock.now() > deadline || self.common.is_ending() => {
+                Err(TryRecvError::Empty) if self.link.setup.clock.now() > deadline || self.link.common.is_ending() => {
                     return None;
                 }
                 Err(TryRecvError::Empty) => self.see_next(arm),
@@ -303,16 +265,16 @@ impl ArmWorker {
 
     /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
     fn take(&mut self, ArmOrder { input, folder }: ArmOrder, arm: &mut dyn Arm) {
-        self.begun = self.setup.clock.now();
+        self.link.begun = self.link.setup.clock.now();
         match input {
             ArmInput::Recover(reply) => {
                 let recovered = self.recover(arm);
-                self.common.done();
+                self.link.common.done();
                 reply.send(recovered);
             }
             ArmInput::All(reply) => {
                 let results = self.probe(&folder, &[], &ProbeSettings::default(), arm, None);
-                self.common.done();
+                self.link.common.done();
                 reply.send(TriggerResponse {
                     success: !results.is_empty() && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
                     message: summary_of(&results),
@@ -321,7 +283,7 @@ impl ArmWorker {
             ArmInput::Feature(request, reply) => {
                 let results = self.probe(&folder, &[request.id], &request.settings, arm, None);
                 let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NO_TARGETS));
-                self.common.done();
+                self.link.common.done();
                 reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
             }
             ArmInput::Goal(goal, handles) => self.goal(&folder, &goal, handles, arm),
@@ -340,7 +302,7 @@ impl ArmWorker {
             code if code < ProbeResult::CANCELLED => GoalEnd::Succeeded,
             _ => GoalEnd::Aborted,
         };
-        self.common.done();
+        self.link.common.done();
         result.send((end, response));
     }
 
@@ -352,13 +314,13 @@ impl ArmWorker {
     }
 
     fn header(&self) -> Header {
-        header(self.port.now_ns(), &self.shared.frame)
+        header(self.port.now_ns(), &self.link.setup.shared.frame)
     }
 
     fn recover(&mut self, arm: &mut dyn Arm) -> TriggerResponse {
         match arm.recover() {
             Ok(()) => {
-                self.common.recovered();
+                self.link.common.recovered();
                 TriggerResponse { success: true, message: "the arm may move again".to_owned() }
             }
             Err(error) => TriggerResponse { success: false, message: error.to_string() },
@@ -381,9 +343,8 @@ impl ArmWorker {
         let count = targets.len();
         let mut results: Vec<ProbeResult> = Vec::new();
         for (number, target) in targets.into_iter().enumerate() {
-            let is_cancelled = watched.is_some_and(|(_, is_cancelled)| is_cancelled.load(Ordering::Acquire));
             let result = match self.wanted(settings, &target) {
-                _ if is_cancelled => {
+                _ if is_cancelled(watched) => {
                     refused(&target, ProbeResult::CANCELLED, "cancelled before it was begun".to_owned())
                 }
                 Err((code, why)) => refused(&target, code, why),
@@ -415,7 +376,7 @@ impl ArmWorker {
             return Err(Box::new(not_probed(*missing, ProbeResult::NO_SUCH_FEATURE, &why)));
         }
         if ids.is_empty() {
-            let tip = self.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
+            let tip = self.link.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
             let far = |target: &ProbeTarget| (target.place - tip).norm();
             targets.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
@@ -425,48 +386,19 @@ impl ArmWorker {
     fn wanted(&self, settings: &ProbeSettings, target: &ProbeTarget) -> Result<Wanted, (u8, String)> {
         let wanted = Wanted::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
-            let scene_allows = self.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
-            if !scene_allows || !self.shared.parameters().bool("allow_motion") {
+            let scene_allows = self.link.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
+            if !scene_allows || !self.link.setup.shared.parameters().bool("allow_motion") {
                 let whose =
                     if scene_allows { "the parameter allow_motion" } else { "allow_motion under robot in the scene" };
                 let why = format!("the arm may not move: look at a dry run first, then set {whose}");
                 return Err((ProbeResult::MOTION_NOT_ALLOWED, why));
             }
-            if let Some((code, why)) = self.common.why_not() {
+            if let Some((code, why)) = self.link.common.why_not() {
                 return Err((code, why.to_owned()));
             }
         }
-        self.common.ready().map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
+        self.link.common.ready().map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
         Ok(wanted)
-    }
-
-    /// What is around the arm while it probes feature `number` of `count`.
-    fn world<'a>(
-        &'a self,
-        still: StaticWorld,
-        watched: Option<GoalWatcher<'a>>,
-        [number, count]: [usize; 2],
-    ) -> ArmWorld<'a> {
-        ArmWorld {
-            clock: &self.setup.clock,
-            still,
-            next: None,
-            mesh: &self.shared.mesh,
-            samples: &*self.samples,
-            base: self.base(),
-            object: &self.shared.frame,
-            tool: &self.setup.tool,
-            offset_ns: self.offset_ns.unwrap_or(0),
-            feedback: watched.map(|(feedback, _)| feedback),
-            is_cancelled: watched.map(|(_, cancelled)| cancelled),
-            common: &self.common,
-            feature: [number as u32 + 1, count as u32],
-            begun: self.begun,
-            progress: None,
-            phase: Phase::Planning,
-            feedback_sent: self.begun,
-            last: None,
-        }
     }
 
     fn probe_one(
@@ -479,20 +411,24 @@ impl ArmWorker {
         counts: [usize; 2],
     ) -> ProbeResult {
         let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
-        let Some(state) = self.common.last() else { return not_ready("nothing has come from the arm yet") };
+        let Some(state) = self.link.common.last() else { return not_ready("nothing has come from the arm yet") };
         let flag = Flag { id: target.id, kind: target.kind, place: target.place, radius: target.radius };
         let (cell, params) = (self.cell.clone(), wanted.params.clone());
-        let ready = ask_mesh(&self.setup.clock, &self.shared.mesh, move |still| {
+        let ready = ask_mesh(&self.link.setup, move |still| {
             let planned = plan(&cell, &params, &still, &flag, &state);
             (still, planned)
         });
         let Some((still, planned)) = self.wait(arm, &ready) else {
             return not_ready("the mesh was not complete in time: probe again");
         };
-        let mut world = self.world(still, watched, counts);
+        let mut world = ArmWorld::new(&self.link, still, watched, counts);
         match planned {
             Ok(planned) => {
-                let poses = world.path(&planned.path);
+                let pose = |place| PoseStamped {
+                    header: header(0, &self.link.setup.shared.frame),
+                    pose: Pose { position: point(place), ..Pose::default() },
+                };
+                let poses = planned.path.iter().map(pose).collect();
                 self.port.publish(Publication::Path(PathMsg { header: self.header(), poses }));
                 if wanted.is_dry_run {
                     return planned_result(target, &planned);
@@ -504,11 +440,11 @@ impl ArmWorker {
         let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(&flag);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {
-            self.common.stop(&probed.ending.to_string());
+            self.link.common.stop(&probed.ending.to_string());
         }
         let ball_radius = wanted.params.pattern.ball_radius;
         if let Err(error) =
-            append_probed_touches(&probed, ball_radius, self.offset_ns.unwrap_or(0), &folder.join(TOUCHES))
+            append_probed_touches(&probed, ball_radius, self.link.offset_ns.unwrap_or(0), &folder.join(TOUCHES))
         {
             warn!(%error, "the touches of a feature are on the topic alone");
         }
@@ -522,12 +458,12 @@ impl ArmWorker {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }
         }
-        let offset_ns = self.offset_ns.unwrap_or(0);
-        for touch in touches_of(target, &probed, &wanted.params, &self.cell, offset_ns, &self.shared.frame) {
+        let offset_ns = self.link.offset_ns.unwrap_or(0);
+        for touch in touches_of(target, &probed, &wanted.params, &self.cell, offset_ns, &self.link.setup.shared.frame) {
             self.port.publish(Publication::ProbeTouch(Box::new(touch)));
         }
         let mut result = result_of(target, &probed);
-        if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.common.why_not()) {
+        if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.link.common.why_not()) {
             result.message = format!("{why}: {}", result.message);
             // the others are refused before they begin
             if code == ProbeResult::SHUTDOWN {

@@ -6,16 +6,16 @@ use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 
 use super::common::Common;
-use crate::clock::Clock;
 use crate::mesh::{FaceHit, TriMesh};
 use crate::probing::arm::{ArmState, Observer};
 use crate::probing::execute::{Phase, Progress, StaticWorld, World};
-use crate::ros::messages::{PoseStamped, ProbeFeedback};
+use crate::ros::messages::ProbeFeedback;
 use crate::ros::node::convert::{as_pose, as_wrench};
-use crate::ros::node::replica::MeshReplica;
+use crate::ros::node::frame_resolver::CELL;
+use crate::ros::node::setup::Setup;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
@@ -27,12 +27,11 @@ const COPY_WAIT: Duration = Duration::from_secs(15);
 /// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for it. Nothing comes where the
 /// mesh is not complete in time, or the memory has no room.
 pub fn ask_mesh<T: Send + 'static>(
-    clock: &Clock,
-    mesh: &MeshReplica,
+    Setup { clock, shared, .. }: &Setup,
     make_of: impl FnOnce(StaticWorld) -> T + Send + 'static,
 ) -> Receiver<T> {
     let (to, ready) = sync_channel(1);
-    let snapshot = mesh.complete();
+    let snapshot = shared.mesh.complete();
     let (working, clock) = (clock.begin_work(), clock.clone());
     let make = move || {
         // the snapshot goes at once: the next version of the mesh need not be a copy
@@ -48,41 +47,64 @@ pub fn ask_mesh<T: Send + 'static>(
     ready
 }
 
-/// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the wrench in the axes of the probe.
-pub fn publish(samples: &dyn SamplePort, base: &str, tool: &str, state: &ArmState, offset_ns: i64) {
-    let stamp_ns = state.stamp_ns + offset_ns;
-    let turned = |v| state.pose_bt.rotation.inverse() * v;
-    let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
-    samples.publish_pose(as_pose(&StampedPose { stamp_ns, pose_ot: state.pose_bt }, base));
-    samples.publish_wrench(as_wrench(&StampedWrench { stamp_ns, wrench }, tool));
+/// What the thread of the arm streams to, and how it stands to it.
+pub struct ArmLink {
+    pub setup: Arc<Setup>,
+    /// where what the arm feels is published
+    pub samples: Box<dyn SamplePort>,
+    pub common: Arc<Common>,
+    /// from the arm's clock to that of ROS, ns
+    pub offset_ns: Option<i64>,
+    /// when the order at hand was taken up
+    pub begun: Instant,
+}
+
+impl ArmLink {
+    /// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the wrench in the axes of the probe.
+    pub fn publish(&self, state: &ArmState) {
+        let Setup { scene, shared, tool, .. } = &*self.setup;
+        // the base of the arm, where the scene says where the scan lies in it
+        let base = if scene.scan_to_space.is_some() { CELL } else { &shared.frame };
+        let stamp_ns = state.stamp_ns + self.offset_ns.unwrap_or(0);
+        let turned = |v| state.pose_bt.rotation.inverse() * v;
+        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
+        self.samples.publish_pose(as_pose(&StampedPose { stamp_ns, pose_ot: state.pose_bt }, base));
+        self.samples.publish_wrench(as_wrench(&StampedWrench { stamp_ns, wrench }, tool));
+    }
+}
+
+/// Who follows a goal: the feedback, and whether it is to end.
+pub type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
+
+/// Whether it is.
+pub fn is_cancelled(watched: Option<GoalWatcher<'_>>) -> bool {
+    watched.is_some_and(|(_, cancelled)| cancelled.load(Ordering::Acquire))
 }
 
 /// The world during one probing.
 pub struct ArmWorld<'a> {
-    pub clock: &'a Clock,
-    pub still: StaticWorld,
+    link: &'a ArmLink,
+    still: StaticWorld,
     /// as it will be
-    pub next: Option<Receiver<StaticWorld>>,
-    pub mesh: &'a MeshReplica,
-    pub samples: &'a dyn SamplePort,
-    pub base: &'a str,
-    pub object: &'a str,
-    pub tool: &'a str,
-    pub offset_ns: i64,
-    pub feedback: Option<&'a Feedback>,
-    pub is_cancelled: Option<&'a Arc<AtomicBool>>,
-    pub common: &'a Common,
-    /// number of the feature, from 1 on, and how many
-    pub feature: [u32; 2],
-    /// when the order was taken up
-    pub begun: Instant,
-    pub progress: Option<Progress>,
-    pub phase: Phase,
-    pub feedback_sent: Instant,
-    pub last: Option<ArmState>,
+    next: Option<Receiver<StaticWorld>>,
+    watched: Option<GoalWatcher<'a>>,
+    /// number of the feature, from 0 on, and how many
+    feature: [usize; 2],
+    progress: Option<Progress>,
+    phase: Phase,
+    feedback_sent: Instant,
+    last: Option<ArmState>,
 }
 
 impl<'a> ArmWorld<'a> {
+    /// What is around the arm while it probes a feature.
+    ///
+    /// - `feature`: its number, from 0 on, and how many there are.
+    pub fn new(link: &'a ArmLink, still: StaticWorld, watched: Option<GoalWatcher<'a>>, feature: [usize; 2]) -> Self {
+        let (phase, feedback_sent) = (Phase::Planning, link.begun);
+        Self { link, still, next: None, watched, feature, progress: None, phase, feedback_sent, last: None }
+    }
+
     /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by as long as it takes to make.
     fn renew(&mut self) {
         match self.next.as_ref().map(Receiver::try_recv) {
@@ -90,16 +112,16 @@ impl<'a> ArmWorld<'a> {
             Some(Err(TryRecvError::Empty)) => return,
             Some(Err(TryRecvError::Disconnected)) | None => {}
         }
-        self.next = Some(ask_mesh(self.clock, self.mesh, |still| still));
+        self.next = Some(ask_mesh(&self.link.setup, |still| still));
     }
 
     fn send_feedback(&mut self) {
-        self.feedback_sent = self.clock.now();
-        let (Some(Feedback(send)), Some(progress)) = (self.feedback, &self.progress) else { return };
+        self.feedback_sent = self.link.setup.clock.now();
+        let (Some((Feedback(send), _)), Some(progress)) = (self.watched, &self.progress) else { return };
         send(ProbeFeedback {
             id: progress.flag,
-            feature: self.feature[0],
-            feature_count: self.feature[1],
+            feature: self.feature[0] as u32 + 1,
+            feature_count: self.feature[1] as u32,
             phase: match self.phase {
                 Phase::Planning => ProbeFeedback::PLANNING,
                 Phase::Link => ProbeFeedback::LINK,
@@ -113,32 +135,23 @@ impl<'a> ArmWorld<'a> {
             touch_count: progress.budget as u32,
             force: self.last.map_or(f64::NAN, |last| last.wrench_b.force.norm()),
             uncertainty: progress.uncertainty.unwrap_or(f64::NAN),
-            elapsed: self.clock.since(self.begun).as_secs_f64(),
+            elapsed: self.link.setup.clock.since(self.link.begun).as_secs_f64(),
         });
-    }
-
-    /// Places of the object as a path.
-    pub fn path(&self, places: &[Point3<f64>]) -> Vec<PoseStamped> {
-        let pose = |place: &Point3<f64>| {
-            let pose_ot = Isometry3::from_parts(place.coords.into(), nalgebra::UnitQuaternion::identity());
-            as_pose(&StampedPose { stamp_ns: 0, pose_ot }, self.object)
-        };
-        places.iter().map(pose).collect()
     }
 }
 
 impl Observer for ArmWorld<'_> {
     fn on_state(&mut self, state: &ArmState) {
         self.last = Some(*state);
-        self.common.see(state);
-        publish(self.samples, self.base, self.tool, state, self.offset_ns);
-        if self.clock.since(self.feedback_sent) >= FEEDBACK_EVERY {
+        self.link.common.see(state);
+        self.link.publish(state);
+        if self.link.setup.clock.since(self.feedback_sent) >= FEEDBACK_EVERY {
             self.send_feedback();
         }
     }
 
     fn is_cancelled(&self) -> bool {
-        self.common.why_not().is_some() || self.is_cancelled.is_some_and(|cancelled| cancelled.load(Ordering::Acquire))
+        self.link.common.why_not().is_some() || is_cancelled(self.watched)
     }
 }
 
