@@ -37,7 +37,7 @@ pub(super) struct DdsGraph {
     /// ROS name and type of our topics, by their name in DDS
     names: BTreeMap<String, (String, String)>,
     /// ROS names of our services
-    services: Vec<String>,
+    pub services: Vec<String>,
     /// our readers and writers: name in DDS, and who is matched
     matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
     /// what others call services with: the service in ROS, and what is so once both sides know each other
@@ -47,7 +47,7 @@ pub(super) struct DdsGraph {
     /// said once for each
     reported: BTreeSet<GUID>,
     /// what sends tiles
-    tiles: Option<GUID>,
+    pub tiles: Option<GUID>,
 }
 
 impl DdsGraph {
@@ -77,16 +77,6 @@ impl DdsGraph {
     /// A topic of ours, and what it is called in ROS.
     pub fn name(&mut self, topic: &Topic, whole: String) {
         self.names.insert(topic.name(), (whole, topic.get_type().name().to_owned()));
-    }
-
-    /// A service of ours.
-    pub fn serve(&mut self, whole: String) {
-        self.services.push(whole);
-    }
-
-    /// The writer of ours that sends tiles.
-    pub fn add_tiles(&mut self, guid: GUID) {
-        self.tiles = Some(guid);
     }
 
     /// A reader or writer of ours.
@@ -166,13 +156,11 @@ impl DdsGraph {
         if guid.prefix == self.own.prefix {
             return;
         }
+        let asked = service_of(topic, "rq", "Request");
         if self.callers.len() < MOST_CALLERS {
-            for (before, after, what) in
-                [("rq", "Request", "a caller is heard"), ("rr", "Reply", "a caller can be answered")]
-            {
-                if let Some(service) = topic.strip_prefix(before).and_then(|topic| topic.strip_suffix(after)) {
-                    self.callers.insert(guid, (service.to_owned(), what));
-                }
+            let what = [(asked, "a caller is heard"), (service_of(topic, "rr", "Reply"), "a caller can be answered")];
+            for (service, what) in what {
+                self.callers.extend(service.map(|service| (guid, (service.to_owned(), what))));
             }
         }
         if let Some((name, ours)) = self.names.get(topic) {
@@ -189,7 +177,7 @@ impl DdsGraph {
             Some(&FAST_DDS) => ServiceMapping::Enhanced,
             _ => return,
         };
-        let Some(service) = topic.strip_prefix("rq").and_then(|topic| topic.strip_suffix("Request")) else { return };
+        let Some(service) = asked else { return };
         if self.services.iter().any(|own| own == service) && wants != self.mapping && self.reported.insert(guid) {
             let right = if wants == ServiceMapping::Cyclone { "cyclone" } else { "enhanced" };
             let reason = format!(
@@ -208,6 +196,11 @@ impl DdsGraph {
         let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
         self.exchange.arrivals.report(name, others.len(), mismatch);
     }
+}
+
+/// The service of a topic of requests or answers.
+fn service_of<'a>(topic: &'a str, before: &str, after: &str) -> Option<&'a str> {
+    topic.strip_prefix(before)?.strip_suffix(after)
 }
 
 /// What is asked for and not offered.

@@ -70,13 +70,22 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let options = declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
     let (context, mut node) = join(config, options)?;
     let mut graph = graph::DdsGraph::new(&context, &exchange, config);
-    let mut topics = topics::DdsTopics::new(config, &mut node, &mut graph, &exchange);
+    let mut topics =
+        topics::DdsTopics { config, node: &mut node, graph: &mut graph, exchange: &exchange, listeners: Vec::new() };
     let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
     subscribe(config, &mut topics)?;
-    let mut listeners = topics.listeners;
-    let mut services = services::DdsServices::new(config, &context, &mut node, &exchange, &room);
+    let listeners = topics.listeners;
+    let mut services = services::DdsServices {
+        config,
+        context: &context,
+        node: &mut node,
+        exchange: &exchange,
+        room: &room,
+        names: Vec::new(),
+        listeners,
+    };
     super::services::serve(&mut services, &exchange)?;
-    services.whole_names()?.into_iter().for_each(|name| graph.serve(name));
+    graph.services = std::mem::take(&mut services.names);
     let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
     let announce = announcing.clone();
     let announce = move |name: &str, value: &ParameterValue| {
@@ -85,7 +94,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
         }
     };
     parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
-    listeners.append(&mut services.listeners);
+    let mut listeners = services.listeners;
     listeners.push(action::server(config, &mut node, &exchange, &room)?);
     let node = Arc::new(node);
     announcing.get_or_init(|| node.clone());

@@ -61,30 +61,14 @@ pub(super) fn unreadable(name: &'static str, exchange: &Exchange, error: &ReadEr
 
 /// Makes servers.
 pub(super) struct DdsServices<'a> {
-    config: &'a NodeConfig,
-    context: &'a Context,
-    node: &'a mut Node,
-    exchange: &'a Arc<Exchange>,
-    room: &'a Arc<Room>,
-    names: Vec<&'static str>,
+    pub config: &'a NodeConfig,
+    pub context: &'a Context,
+    pub node: &'a mut Node,
+    pub exchange: &'a Arc<Exchange>,
+    pub room: &'a Arc<Room>,
+    /// of those that are served so far, absolute and remapped
+    pub names: Vec<String>,
     pub listeners: Vec<Box<dyn Listener>>,
-}
-
-impl<'a> DdsServices<'a> {
-    pub fn new(
-        config: &'a NodeConfig,
-        context: &'a Context,
-        node: &'a mut Node,
-        exchange: &'a Arc<Exchange>,
-        room: &'a Arc<Room>,
-    ) -> Self {
-        Self { config, context, node, exchange, room, names: Vec::new(), listeners: Vec::new() }
-    }
-
-    /// Of those that are served so far, absolute and remapped.
-    pub fn whole_names(&self) -> Result<Vec<String>, RosError> {
-        self.names.iter().map(|name| Ok(self.config.resolve(name)?)).collect()
-    }
 }
 
 impl<S> Serves<S> for DdsServices<'_>
@@ -100,7 +84,7 @@ where
         let server =
             Server::<S::Request, S::Response>::new(self.config, self.context, self.node, name, package, type_name);
         let (server, exchange, room) = (Arc::new(server?), self.exchange.clone(), self.room.clone());
-        self.names.push(name);
+        self.names.push(self.config.resolve(name)?);
         self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
         Ok(())
     }

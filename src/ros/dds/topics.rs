@@ -49,23 +49,14 @@ fn limit(topic: Topic) -> Option<usize> {
 
 /// Publishes and subscribes.
 pub(super) struct DdsTopics<'a> {
-    config: &'a NodeConfig,
-    node: &'a mut Node,
-    graph: &'a mut DdsGraph,
-    exchange: &'a Arc<Exchange>,
+    pub config: &'a NodeConfig,
+    pub node: &'a mut Node,
+    pub graph: &'a mut DdsGraph,
+    pub exchange: &'a Arc<Exchange>,
     pub listeners: Vec<Box<dyn Listener>>,
 }
 
-impl<'a> DdsTopics<'a> {
-    pub fn new(
-        config: &'a NodeConfig,
-        node: &'a mut Node,
-        graph: &'a mut DdsGraph,
-        exchange: &'a Arc<Exchange>,
-    ) -> Self {
-        Self { config, node, graph, exchange, listeners: Vec::new() }
-    }
-
+impl DdsTopics<'_> {
     fn announce<M: RosMessage>(&mut self, name: &str, qos: &QosProfile) -> Result<rustdds::Topic, RosError> {
         let whole = self.config.resolve(name)?;
         let topic = make_topic::<M>(self.node, &whole, qos)?;
@@ -84,7 +75,7 @@ impl<M: RosMessage> Publishes<M> for DdsTopics<'_> {
         let publisher = self.node.create_publisher::<M>(&announced, Some(profile)).during("publishing a topic")?;
         self.graph.add(publisher.guid(), &announced);
         if topic == MESH {
-            self.graph.add_tiles(publisher.guid());
+            self.graph.tiles = Some(publisher.guid());
         }
         Ok(Box::new(move |message| match publisher.publish(message) {
             Ok(()) => Sent::Done,

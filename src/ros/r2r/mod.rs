@@ -92,15 +92,16 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
     let mut graph = graph::R2rGraph::new(context);
-    let mut topics = topics::R2rTopics::new(config, &mut node, &mut graph, &exchange);
+    let mut topics =
+        topics::R2rTopics { config, node: &mut node, graph: &mut graph, exchange: &exchange, sources: Vec::new() };
     let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
     subscribe(config, &mut topics)?;
-    let mut sources = topics.sources;
+    let sources = topics.sources;
     let announce = announce(&mut node, config.place.full_name(), &exchange)?;
-    let mut services = services::R2rServices::new(&mut node, &exchange);
+    let mut services = services::R2rServices { node: &mut node, exchange: &exchange, sources };
     super::services::serve(&mut services, &exchange)?;
     parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
-    sources.append(&mut services.sources);
+    let mut sources = services.sources;
     sources.extend(action::server(&mut node, &exchange)?);
     let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };
     let spinning = exchange.thread("touchup-spin", move |exchange| spin(node, sources, graph, exchange))?;

@@ -13,15 +13,9 @@ use crate::ros::services::Serves;
 
 /// Makes servers.
 pub(super) struct R2rServices<'a> {
-    node: &'a mut Node,
-    exchange: &'a Arc<Exchange>,
+    pub node: &'a mut Node,
+    pub exchange: &'a Arc<Exchange>,
     pub sources: Vec<PollSource>,
-}
-
-impl<'a> R2rServices<'a> {
-    pub fn new(node: &'a mut Node, exchange: &'a Arc<Exchange>) -> Self {
-        Self { node, exchange, sources: Vec::new() }
-    }
 }
 
 impl<S: R2rService> Serves<S> for R2rServices<'_> {

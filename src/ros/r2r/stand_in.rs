@@ -2,6 +2,15 @@
 //! `generate/` lists, and nothing behind them. For feature `r2r-check` alone; nothing here can run.
 #![expect(non_snake_case, reason = "services and actions are modules there, with the names of their files")]
 
+/// Functions that nothing here can do.
+macro_rules! needs_ros {
+    ($(fn $name:ident($($taken:ty),*) -> $given:ty;)+) => {
+        $(fn $name($(_: $taken),*) -> $given {
+            unimplemented!("needs ROS")
+        })+
+    };
+}
+
 /// A message: its fields, and that r2r takes it for one.
 macro_rules! message {
     ($name:ident { $($field:ident: $kind:ty),* $(,)? }) => {
@@ -11,28 +20,19 @@ macro_rules! message {
         }
 
         impl Default for $name {
-            fn default() -> Self {
-                unimplemented!("needs ROS")
+            needs_ros! {
+                fn default() -> Self;
             }
         }
 
         impl r2r::WrappedTypesupport for $name {
             type CStruct = ();
 
-            fn get_ts() -> &'static r2r_rcl::rosidl_message_type_support_t {
-                unimplemented!("needs ROS")
-            }
-
-            fn create_msg() -> *mut () {
-                unimplemented!("needs ROS")
-            }
-
-            fn destroy_msg(_: *mut ()) {
-                unimplemented!("needs ROS")
-            }
-
-            fn from_native((): &()) -> Self {
-                unimplemented!("needs ROS")
+            needs_ros! {
+                fn get_ts() -> &'static r2r_rcl::rosidl_message_type_support_t;
+                fn create_msg() -> *mut ();
+                fn destroy_msg(*mut ()) -> ();
+                fn from_native(&()) -> Self;
             }
 
             fn copy_to_native(&self, (): &mut ()) {
@@ -56,8 +56,8 @@ macro_rules! service {
                 type Request = Request;
                 type Response = Response;
 
-                fn get_ts() -> &'static r2r_rcl::rosidl_service_type_support_t {
-                    unimplemented!("needs ROS")
+                needs_ros! {
+                    fn get_ts() -> &'static r2r_rcl::rosidl_service_type_support_t;
                 }
             }
         }
@@ -88,48 +88,18 @@ macro_rules! action {
                 type SendGoal = Wire::Service;
                 type GetResult = Wire::Service;
 
-                fn get_ts() -> &'static r2r_rcl::rosidl_action_type_support_t {
-                    unimplemented!("needs ROS")
-                }
-
-                fn make_goal_request_msg(_: UUID, _: Goal) -> Wire::Request {
-                    unimplemented!("needs ROS")
-                }
-
-                fn make_goal_response_msg(_: bool, _: Time) -> Wire::Response {
-                    unimplemented!("needs ROS")
-                }
-
-                fn make_feedback_msg(_: UUID, _: Feedback) -> Feedback {
-                    unimplemented!("needs ROS")
-                }
-
-                fn make_result_request_msg(_: UUID) -> Wire::Request {
-                    unimplemented!("needs ROS")
-                }
-
-                fn make_result_response_msg(_: i8, _: Result) -> Wire::Response {
-                    unimplemented!("needs ROS")
-                }
-
-                fn destructure_goal_request_msg(_: Wire::Request) -> (UUID, Goal) {
-                    unimplemented!("needs ROS")
-                }
-
-                fn destructure_goal_response_msg(_: Wire::Response) -> (bool, Time) {
-                    unimplemented!("needs ROS")
-                }
-
-                fn destructure_feedback_msg(_: Feedback) -> (UUID, Feedback) {
-                    unimplemented!("needs ROS")
-                }
-
-                fn destructure_result_response_msg(_: Wire::Response) -> (i8, Result) {
-                    unimplemented!("needs ROS")
-                }
-
-                fn destructure_result_request_msg(_: Wire::Request) -> UUID {
-                    unimplemented!("needs ROS")
+                needs_ros! {
+                    fn get_ts() -> &'static r2r_rcl::rosidl_action_type_support_t;
+                    fn make_goal_request_msg(UUID, Goal) -> Wire::Request;
+                    fn make_goal_response_msg(bool, Time) -> Wire::Response;
+                    fn make_feedback_msg(UUID, Feedback) -> Feedback;
+                    fn make_result_request_msg(UUID) -> Wire::Request;
+                    fn make_result_response_msg(i8, Result) -> Wire::Response;
+                    fn destructure_goal_request_msg(Wire::Request) -> (UUID, Goal);
+                    fn destructure_goal_response_msg(Wire::Response) -> (bool, Time);
+                    fn destructure_feedback_msg(Feedback) -> (UUID, Feedback);
+                    fn destructure_result_response_msg(Wire::Response) -> (i8, Result);
+                    fn destructure_result_request_msg(Wire::Request) -> UUID;
                 }
             }
         }

@@ -23,22 +23,11 @@ pub(super) fn profile(topic: Topic) -> QosProfile {
 
 /// Publishes and subscribes.
 pub(super) struct R2rTopics<'a> {
-    config: &'a NodeConfig,
-    node: &'a mut Node,
-    graph: &'a mut R2rGraph,
-    exchange: &'a Arc<Exchange>,
+    pub config: &'a NodeConfig,
+    pub node: &'a mut Node,
+    pub graph: &'a mut R2rGraph,
+    pub exchange: &'a Arc<Exchange>,
     pub sources: Vec<PollSource>,
-}
-
-impl<'a> R2rTopics<'a> {
-    pub fn new(
-        config: &'a NodeConfig,
-        node: &'a mut Node,
-        graph: &'a mut R2rGraph,
-        exchange: &'a Arc<Exchange>,
-    ) -> Self {
-        Self { config, node, graph, exchange, sources: Vec::new() }
-    }
 }
 
 impl<M> Publishes<M> for R2rTopics<'_>
