@@ -41,7 +41,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
     print_result(&ready.cost(config.parameters.string("robot") != "none").to_string());
     let (inbox, arrivals) = sync_channel(INBOX);
-    end_on_signals(inbox.clone()).map_err(|error| NodeError::NoThread(error.to_string()))?;
+    end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let port = ros::start(&config, inbox)?;
     let arm = arm_of(&config, ready.scene())?;
     let running = ready.start(port, arrivals, arm)?;

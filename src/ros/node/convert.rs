@@ -53,16 +53,24 @@ pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
 }
 
 /// Of a message.
+pub fn point_of(p: &Point) -> Point3<f64> {
+    Point3::new(p.x, p.y, p.z)
+}
+
+/// Of a message.
 pub fn vector_of(v: &Vector3Msg) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
 }
 
+/// As a message has it.
+pub fn pose(position: &Point3<f64>, q: &UnitQuaternion<f64>) -> Pose {
+    Pose { position: point(position), orientation: QuaternionMsg { x: q.i, y: q.j, z: q.k, w: q.w } }
+}
+
 /// A pose of a recording as a message in `frame`.
-pub fn as_pose(pose: &StampedPose, frame: &str) -> PoseStamped {
-    let Isometry3 { rotation, translation } = pose.pose_ot;
-    let orientation = QuaternionMsg { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w };
-    let pose_msg = Pose { position: point(&translation.vector.into()), orientation };
-    PoseStamped { header: header(pose.stamp_ns, frame), pose: pose_msg }
+pub fn as_pose(stamped: &StampedPose, frame: &str) -> PoseStamped {
+    let Isometry3 { rotation, translation } = &stamped.pose_ot;
+    PoseStamped { header: header(stamped.stamp_ns, frame), pose: pose(&translation.vector.into(), rotation) }
 }
 
 /// A wrench of a recording as a message in the axes of `frame`.

@@ -1,5 +1,6 @@
 //! How the node says how it is: in words, and in numbers once a second.
 
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tracing::{info, warn};
@@ -54,18 +55,15 @@ impl RefinementWorker {
         {
             return said(DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
         }
-        if self.streams.iter().all(|stream| stream.arrived() == 0) {
+        if self.streams.iter().all(|stream| stream.arrived == 0) {
             return said(DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
         }
-        let late: Vec<_> =
-            ["pose", "wrench"].iter().zip(&self.streams).zip(is_stale).filter(|(_, late)| *late).collect();
-        let ages: Vec<_> = late
-            .iter()
-            .map(|((name, stream), _)| match stream.age(now) {
-                Some(age) => format!("the last {name} came {} ms ago", age.as_millis()),
-                None => format!("no {name} has come yet"),
-            })
-            .collect();
+        let late = ["pose", "wrench"].iter().zip(&self.streams).zip(is_stale).filter(|(_, late)| *late);
+        let ages = late.map(|((name, stream), _)| match stream.age(now) {
+            Some(age) => format!("the last {name} came {} ms ago", age.as_millis()),
+            None => format!("no {name} has come yet"),
+        });
+        let ages: Vec<_> = ages.collect();
         match ages.is_empty() {
             false => said(DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", "))),
             true => said(DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
@@ -80,48 +78,41 @@ impl RefinementWorker {
     pub(super) fn publish_diagnostics(&mut self) {
         let StreamState { level, words } = self.state();
         let report = self.report();
-        let stamp_ns = self.port.now_ns();
-        let status = DiagnosticStatus {
+        let status = |name: &str, message: String, values| DiagnosticStatus {
             level,
-            name: "touchup: session".to_owned(),
-            message: words,
+            name: format!("touchup: {name}"),
+            message,
             hardware_id: self.setup.source.to_owned(),
-            values: self.numbers(&report),
+            values,
         };
-        let streams = DiagnosticStatus {
-            level: if level == DiagnosticStatus::OK { DiagnosticStatus::OK } else { level },
-            name: "touchup: streams".to_owned(),
-            message: "how poses and wrenches come, and what was refused".to_owned(),
-            hardware_id: self.setup.source.to_owned(),
-            values: self.stream_numbers(&report),
-        };
-        let message = DiagnosticArray { header: header(stamp_ns, ""), status: vec![status, streams] };
+        let how = "how poses and wrenches come, and what was refused".to_owned();
+        let status =
+            vec![status("session", words, self.numbers(&report)), status("streams", how, self.stream_numbers(&report))];
+        let message = DiagnosticArray { header: header(self.port.now_ns(), ""), status };
         self.setup.shared.offer(&self.view, ViewInput::Diagnostics(Box::new(message)));
     }
 
     fn numbers(&self, report: &SessionReport) -> Vec<KeyValue> {
-        let Quantiles { median, p99, max, .. } = report.push_ns;
-        let latency = report.latency_ns;
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
         let unrecorded = self.session.recorder.unrecorded();
         let shared = &self.setup.shared;
         let mut values = vec![
-            value("session", report.session.clone()),
+            value("session", &report.session),
             value("mesh_version", self.session.version),
             value("accepted", report.accepted),
             value("contacts", report.contacts),
-            value("push_p50_us", us(median)),
-            value("push_p99_us", us(p99)),
-            value("push_max_us", us(max)),
-            value("latency_p50_us", us(latency.median)),
-            value("latency_p99_us", us(latency.p99)),
-            value("latency_max_us", us(latency.max)),
+        ];
+        for (name, Quantiles { median, p99, max, .. }) in [("push", report.push_ns), ("latency", report.latency_ns)] {
+            let quantiles = [("p50", median), ("p99", p99), ("max", max)];
+            values.extend(quantiles.map(|(which, ns)| value(&format!("{name}_{which}_us"), us(ns))));
+        }
+        values.extend([
             value("late_renewals", report.late_renewals),
-            value("tiles_waiting", shared.waiting_tiles()),
+            value("tiles_waiting", shared.tiles_waiting.load(Ordering::Relaxed)),
             value("versions_behind", self.session.version.saturating_sub(shared.mesh.version())),
             value("dropped_view_frames", report.dropped_view_frames),
             value("unrecorded", unrecorded.messages),
-        ];
+        ]);
         values.extend(unrecorded.reason.map(|reason| value("recording", reason)));
         values
     }
@@ -130,20 +121,25 @@ impl RefinementWorker {
         let now = self.setup.clock.now();
         let mut values = Vec::new();
         for (name, stream) in ["pose", "wrench"].iter().zip(&self.streams) {
-            values.push(value(&format!("{name}_rate_hz"), format!("{:.1}", stream.rate_hz())));
             let age = stream.age(now).map_or_else(|| "none came".to_owned(), |age| age.as_millis().to_string());
-            values.push(value(&format!("{name}_age_ms"), age));
-            values.push(value(&format!("{name}_gaps"), stream.gaps));
+            values.extend([
+                value(&format!("{name}_rate_hz"), format!("{:.1}", stream.rate_hz)),
+                value(&format!("{name}_age_ms"), age),
+                value(&format!("{name}_gaps"), stream.gaps),
+            ]);
         }
         let ([wrenches, poses], [dropped, others], [tiles, unsent]) = (report.lost, report.dropped, report.unsent);
-        values.push(value("lost_poses", poses));
-        values.push(value("lost_wrenches", wrenches));
-        values.push(value("dropped", dropped));
-        values.push(value("dropped_others", others));
-        values.push(value("unsent_tiles", tiles));
-        values.push(value("unsent", unsent));
-        values.push(value("paused", report.paused));
-        values.push(value("clock_jumps", report.clock_jumps));
+        let counts = [
+            ("lost_poses", poses),
+            ("lost_wrenches", wrenches),
+            ("dropped", dropped),
+            ("dropped_others", others),
+            ("unsent_tiles", tiles),
+            ("unsent", unsent),
+            ("paused", report.paused),
+            ("clock_jumps", report.clock_jumps),
+        ];
+        values.extend(counts.map(|(name, count)| value(name, count)));
         values.extend(report.refused.iter().map(|(reason, count)| value(&format!("refused_{reason}"), count)));
         values.extend(self.endpoints.values().map(|endpoint| {
             let why = endpoint.mismatch.as_ref().map_or(String::new(), |why| format!(", {why}"));

@@ -23,7 +23,7 @@ pub enum NodeError {
     RegionWithRobot,
     /// The scene cannot be used.
     #[error(transparent)]
-    Scene(Box<SceneError>),
+    Scene(#[from] Box<SceneError>),
     /// The scene has no `refine`.
     #[error("the scene names no `refine`, so nothing would move the mesh: add `refine:` to it")]
     NothingMoves,
@@ -34,7 +34,7 @@ pub enum NodeError {
     NoRobot,
     /// The scan cannot be read.
     #[error("{0}")]
-    Scan(Box<MeshFileError>),
+    Scan(#[from] Box<MeshFileError>),
     /// A setting of the scene.
     #[error(transparent)]
     Setting(#[from] SettingError),
@@ -57,7 +57,7 @@ pub enum NodeError {
     Session(#[from] SessionError),
     /// The result cannot be written.
     #[error(transparent)]
-    Outcome(Box<OutcomeError>),
+    Outcome(#[from] Box<OutcomeError>),
     /// The result is written, the recording is not whole.
     #[error("{count} messages are not in the session's recording: {reason}")]
     Unrecorded {
@@ -68,27 +68,8 @@ pub enum NodeError {
     },
     /// The system gives no thread.
     #[error("no thread for the node: {0}; end other programs")]
-    NoThread(String),
+    NoThread(#[from] std::io::Error),
     /// A thread ended by a fault.
     #[error("a thread of the node ended by a fault of touchup: please report it with the session's folder")]
     Stopped,
-}
-
-impl From<SceneError> for NodeError {
-    fn from(error: SceneError) -> Self {
-        Self::Scene(Box::new(error))
-    }
-}
-
-impl From<OutcomeError> for NodeError {
-    fn from(error: OutcomeError) -> Self {
-        Self::Outcome(Box::new(error))
-    }
-}
-
-impl NodeError {
-    /// Of the operating system.
-    pub(super) fn no_thread(error: std::io::Error) -> Self {
-        Self::NoThread(error.to_string())
-    }
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::convert::{NO_VECTOR, header, point, vector};
+use super::convert::{NO_VECTOR, header, point, point_of, pose, vector, vector_of};
 use crate::features::{Feature, FittedTo, Kind, Measured};
 use crate::ros::messages::{
-    ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Quaternion, Vector3 as Vector3Msg,
+    ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Vector3 as Vector3Msg,
 };
 
 /// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
@@ -140,13 +140,19 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
     let frame = &features.header;
     let mut markers = vec![Marker { header: frame.clone(), action: Marker::DELETEALL, ..Marker::default() }];
     for feature in &features.features {
-        let base = Marker { header: frame.clone(), id: feature.id as i32, color: colour(feature), ..Marker::default() };
+        let base = Marker {
+            header: frame.clone(),
+            ns: "features".to_owned(),
+            id: feature.id as i32,
+            color: colour(feature),
+            ..Marker::default()
+        };
         markers.extend(body(feature, &base));
         if has_label(feature) {
             let up = axis_of(feature);
             // the center of a boss is at its foot, and the label would be inside
             let is_boss = feature.kind == FeatureMsg::KIND_BOSS && !feature.depth.is_nan();
-            let place = centre_of(feature) + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
+            let place = point_of(&feature.center) + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
             markers.push(Marker {
                 ns: "labels".to_owned(),
                 r#type: Marker::TEXT_VIEW_FACING,
@@ -183,7 +189,6 @@ fn colour(feature: &FeatureMsg) -> ColorRGBA {
 
 fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
     let sphere = |diameter: f64| Marker {
-        ns: "features".to_owned(),
         r#type: Marker::SPHERE,
         pose: Pose { position: feature.center, ..Pose::default() },
         scale: Vector3Msg { x: diameter, y: diameter, z: diameter },
@@ -207,7 +212,6 @@ fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
     let up = if feature.kind == FeatureMsg::KIND_EDGE { Vector3::zeros() } else { axis_of(feature) * (0.5 * LINE) };
     let raised = |p: &Point| Point { x: p.x + up.x, y: p.y + up.y, z: p.z + up.z };
     Marker {
-        ns: "features".to_owned(),
         r#type: Marker::LINE_STRIP,
         scale: Vector3Msg { x: LINE, ..Vector3Msg::default() },
         points: feature.points.iter().map(raised).collect(),
@@ -215,13 +219,9 @@ fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
     }
 }
 
-fn centre_of(feature: &FeatureMsg) -> Point3<f64> {
-    Point3::new(feature.center.x, feature.center.y, feature.center.z)
-}
-
 /// Up, where it has none.
 fn axis_of(feature: &FeatureMsg) -> Vector3<f64> {
-    let axis = Vector3::new(feature.axis.x, feature.axis.y, feature.axis.z);
+    let axis = vector_of(&feature.axis);
     if axis.iter().all(|x| x.is_finite()) { axis } else { Vector3::z() }
 }
 
@@ -230,15 +230,13 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     let height = if feature.depth.is_nan() { LINE } else { feature.depth };
     // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is seen around it
     let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS { (1.0, 0.5) } else { (-1.0, -0.5) };
-    let middle = centre_of(feature) + axis * (up * height + 0.5 * CLEAR);
+    let middle = point_of(&feature.center) + axis * (up * height + 0.5 * CLEAR);
     let diameter = feature.diameter + 2.0 * side * CLEAR;
     let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    let q = UnitQuaternion::from_rotation_matrix(&turn);
     Marker {
-        ns: "features".to_owned(),
         r#type: Marker::CYLINDER,
-        pose: Pose { position: point(&middle), orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w } },
+        pose: pose(&middle, &UnitQuaternion::from_rotation_matrix(&turn)),
         scale: Vector3Msg { x: diameter, y: diameter, z: height + CLEAR },
         ..base.clone()
     }

@@ -185,19 +185,21 @@ impl FeatureWorker {
         self.names.get(&feature.id).copied().unwrap_or(feature.id)
     }
 
-    fn fits(flag: &FlaggedPlace, feature: &Feature) -> bool {
-        let is_kind = flag.kind == FeatureMsg::KIND_UNKNOWN || flag.kind == feature_messages::number_of(feature.kind);
-        is_kind && (feature.centre.value - flag.point).norm() <= flag.radius
+    /// The nearest feature where somebody pointed, of the kind that is meant. A region to be explored stays one: a plane in it is
+    /// no answer.
+    fn nearest(&self, flag: &FlaggedPlace, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
+        let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
+        let is_meant = |feature: &&Feature| {
+            flag.kind == feature_messages::number_of(feature.kind) && far(feature) <= flag.radius && may_be(feature)
+        };
+        self.tracker.features().iter().filter(is_meant).min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
     /// A feature that appears where somebody pointed goes by the number of that flag.
     fn name_found_flags(&mut self) {
         for (id, flag) in std::mem::take(&mut self.flags) {
-            let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
-            let is_new = |feature: &&Feature| !self.names.contains_key(&feature.id) && Self::fits(&flag, feature);
-            // a region to be explored stays one: a plane in it is no answer
-            let wanted = self.tracker.features().iter().filter(|_| flag.kind != FeatureMsg::KIND_UNKNOWN);
-            match wanted.filter(is_new).min_by(|a, b| far(a).total_cmp(&far(b))).map(|feature| feature.id) {
+            let is_new = |feature: &Feature| !self.names.contains_key(&feature.id);
+            match self.nearest(&flag, is_new).map(|feature| feature.id) {
                 Some(found) => {
                     self.names.insert(found, id);
                     self.radii.insert(id, flag.radius);
@@ -208,19 +210,15 @@ impl FeatureWorker {
     }
 
     fn flag(&mut self, flag: FlaggedPlace) -> FlagFeatureResponse {
+        let refused = |message| FlagFeatureResponse { success: false, message, id: 0 };
         let Some(kind) = KIND_NAMES.get(usize::from(flag.kind)) else {
-            let message = format!("there is no kind {}: 0 to {} are", flag.kind, KIND_NAMES.len() - 1);
-            return FlagFeatureResponse { success: false, message, id: 0 };
+            return refused(format!("there is no kind {}: 0 to {} are", flag.kind, KIND_NAMES.len() - 1));
         };
         if self.flags.len() >= MOST_FLAGS {
-            let message = format!("{MOST_FLAGS} places are flagged already: take some back");
-            return FlagFeatureResponse { success: false, message, id: 0 };
+            return refused(format!("{MOST_FLAGS} places are flagged already: take some back"));
         }
-        let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
-        let wanted = self.tracker.features().iter().filter(|_| flag.kind != FeatureMsg::KIND_UNKNOWN);
-        let known = wanted.filter(|feature| Self::fits(&flag, feature)).min_by(|a, b| far(a).total_cmp(&far(b)));
         self.has_changes = true;
-        if let Some(id) = known.map(|feature| self.name_of(feature)) {
+        if let Some(id) = self.nearest(&flag, |_| true).map(|feature| self.name_of(feature)) {
             self.radii.insert(id, flag.radius);
             return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
         }
@@ -252,16 +250,8 @@ impl FeatureWorker {
         });
         let found = self.tracker.features().iter().map(|feature| {
             let id = self.name_of(feature);
-            let radius = self.radii.get(&id).copied();
-            (
-                radius.is_some(),
-                ProbeTarget {
-                    id,
-                    kind: Some(feature.kind),
-                    place: feature.centre.value,
-                    radius: radius.unwrap_or(default),
-                },
-            )
+            let (kind, place, radius) = (Some(feature.kind), feature.centre.value, self.radii.get(&id).copied());
+            (radius.is_some(), ProbeTarget { id, kind, place, radius: radius.unwrap_or(default) })
         });
         let is_wanted = |target: &ProbeTarget, is_flagged: bool| match ids.is_empty() {
             true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),

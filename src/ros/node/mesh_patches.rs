@@ -13,17 +13,47 @@ use crate::ros::messages::MeshPatch;
 const OF_A_PART: usize = 1000;
 
 /// What followers have, and what they lack.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct MeshPatches {
     /// the state that they have
     version: u64,
-    vertices: IdSet,
-    faces: IdSet,
-    /// for each number, whether they have such a vertex, or face
-    has_vertex: Vec<bool>,
-    has_face: Vec<bool>,
+    vertices: FollowedIds,
+    faces: FollowedIds,
     /// variance of what rests on the scan, m²; NaN where it is not known
     scan_variance: f32,
+}
+
+/// Vertices or faces of followers.
+#[derive(Debug)]
+struct FollowedIds {
+    changed: IdSet,
+    /// for each number, whether they have such a one
+    had: Vec<bool>,
+}
+
+impl FollowedIds {
+    fn of(slots: u32, is_there: impl Fn(u32) -> bool) -> Self {
+        Self { changed: IdSet::default(), had: (0..slots).map(is_there).collect() }
+    }
+
+    /// What is to be set, and what is to be removed; from now on they have it.
+    fn take(&mut self, is_there: impl Fn(u32) -> bool) -> [Vec<u32>; 2] {
+        let Self { changed, had } = self;
+        let (mut set, mut removed) = (Vec::new(), Vec::new());
+        changed.take(usize::MAX, |id| {
+            let at = id as usize;
+            if at >= had.len() {
+                had.resize(at + 1, false);
+            }
+            let is_there = is_there(id);
+            match (is_there, std::mem::replace(&mut had[at], is_there)) {
+                (true, _) => set.push(id),
+                (false, true) => removed.push(id),
+                (false, false) => {}
+            }
+        });
+        [set, removed]
+    }
 }
 
 impl MeshPatches {
@@ -34,48 +64,27 @@ impl MeshPatches {
         let [vertices, faces] = replica.slots();
         Self {
             version: replica.version,
-            has_vertex: (0..vertices).map(|vertex| replica.vertex(vertex).is_some()).collect(),
-            has_face: (0..faces).map(|face| replica.face(face).is_some()).collect(),
+            vertices: FollowedIds::of(vertices, |vertex| replica.vertex(vertex).is_some()),
+            faces: FollowedIds::of(faces, |face| replica.face(face).is_some()),
             scan_variance: scan_sigma.map_or(f32::NAN, |sigma| (sigma * sigma) as f32),
-            ..Self::default()
         }
     }
 
     /// Remembers what changed.
     pub fn note(&mut self, edits: &Edits) {
-        edits.vertices.iter().for_each(|(vertex, _)| self.vertices.insert(*vertex));
-        edits.faces.iter().for_each(|(face, _)| self.faces.insert(*face));
+        edits.vertices.iter().for_each(|(vertex, _)| self.vertices.changed.insert(*vertex));
+        edits.faces.iter().for_each(|(face, _)| self.faces.changed.insert(*face));
     }
 
     /// The change from what followers have to what the replica has, in parts; none when it is the same.
     pub fn change(&mut self, replica: &MeshVersion, frame: &str) -> Vec<MeshPatch> {
-        if self.version == replica.version || (self.vertices.is_empty() && self.faces.is_empty()) {
+        let is_same = self.vertices.changed.is_empty() && self.faces.changed.is_empty();
+        if self.version == replica.version || is_same {
             return Vec::new();
         }
-        let mut draft = DraftPatch::default();
-        let Self { vertices, faces, has_vertex, has_face, .. } = self;
-        vertices.take(usize::MAX, |vertex| match (replica.vertex(vertex).is_some(), remembered(has_vertex, vertex)) {
-            (true, had) => {
-                draft.set.push(vertex);
-                *had = true;
-            }
-            (false, had) if *had => {
-                draft.removed_vertices.push(vertex);
-                *had = false;
-            }
-            _ => {}
-        });
-        faces.take(usize::MAX, |face| match (replica.face(face).is_some(), remembered(has_face, face)) {
-            (true, had) => {
-                draft.faces.push(face);
-                *had = true;
-            }
-            (false, had) if *had => {
-                draft.removed_faces.push(face);
-                *had = false;
-            }
-            _ => {}
-        });
+        let [set, removed_vertices] = self.vertices.take(|vertex| replica.vertex(vertex).is_some());
+        let [faces, removed_faces] = self.faces.take(|face| replica.face(face).is_some());
+        let draft = DraftPatch { removed_faces, set, faces, removed_vertices };
         let base = std::mem::replace(&mut self.version, replica.version);
         let part = |part| draft.part(part, replica, [base, self.version], frame, self.scan_variance);
         (0..draft.part_count()).map(part).collect()
@@ -98,14 +107,6 @@ impl MeshPatches {
     }
 }
 
-fn remembered(list: &mut Vec<bool>, id: u32) -> &mut bool {
-    let at = id as usize;
-    if at >= list.len() {
-        list.resize(at + 1, false);
-    }
-    &mut list[at]
-}
-
 /// A change before it is cut into parts.
 #[derive(Default)]
 struct DraftPatch {
@@ -116,12 +117,9 @@ struct DraftPatch {
 }
 
 impl DraftPatch {
-    fn lengths(&self) -> [usize; 4] {
-        [&self.removed_faces, &self.set, &self.faces, &self.removed_vertices].map(Vec::len)
-    }
-
     fn part_count(&self) -> u32 {
-        (self.lengths().iter().sum::<usize>().div_ceil(OF_A_PART) as u32).max(1)
+        let lists = [&self.removed_faces, &self.set, &self.faces, &self.removed_vertices];
+        (lists.map(Vec::len).iter().sum::<usize>().div_ceil(OF_A_PART) as u32).max(1)
     }
 
     /// The four lists one after the other, cut into parts: so a face comes after its corners, and a vertex goes after all

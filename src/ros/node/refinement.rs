@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -85,9 +86,6 @@ pub struct RefinementWorker {
 
 impl RefinementWorker {
     /// Ready to take samples.
-    ///
-    /// # Errors
-    /// [`NodeError`], for settings of the scene.
     pub fn new(
         setup: Arc<Setup>,
         port: Arc<dyn Port>,
@@ -96,12 +94,12 @@ impl RefinementWorker {
         features: SyncSender<FeatureInput>,
         spare: Receiver<Box<Edits>>,
         arm: Option<ArmHandle>,
-    ) -> Result<Self, NodeError> {
+    ) -> Self {
         let now = setup.clock.now();
         let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
         let side_work = SideWork::on(setup.clock.clone());
         let resolver = FrameResolver::new(setup.frame_names(), setup.scene.placement());
-        Ok(Self {
+        Self {
             resolver,
             setup,
             port,
@@ -126,7 +124,7 @@ impl RefinementWorker {
             mismatch_ns: i64::MIN,
             mismatch_rate_hz,
             diagnosed: now,
-        })
+        }
     }
 
     /// Runs until it is asked to end, or nobody can ask any more; ends the session.
@@ -164,7 +162,7 @@ impl RefinementWorker {
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
-            Arrival::Viewer => self.setup.shared.note_viewer(),
+            Arrival::Viewer => self.setup.shared.has_new_viewer.store(true, Ordering::Relaxed),
             Arrival::Shutdown => {
                 // it stops, retracts and ends while the session is written
                 self.arm = None;

@@ -119,11 +119,10 @@ impl Prepared {
         let features = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), name);
         let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_features.clone())).transpose()?;
         let (handle, arm) = arm.unzip();
-        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, handle)?;
-        let view = begin(&clock, "view", move || view.run(&view_inputs)).map_err(NodeError::no_thread)?;
-        let features =
-            begin(&clock, "features", move || features.run(&feature_inputs)).map_err(NodeError::no_thread)?;
-        let haptic = begin(&clock, "haptic", move || haptic.run(&inbox)).map_err(NodeError::no_thread)?;
+        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, handle);
+        let view = begin(&clock, "view", move || view.run(&view_inputs))?;
+        let features = begin(&clock, "features", move || features.run(&feature_inputs))?;
+        let haptic = begin(&clock, "haptic", move || haptic.run(&inbox))?;
         Ok(Node { haptic, view, features, arm, folder })
     }
 }

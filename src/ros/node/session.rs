@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
@@ -214,7 +215,7 @@ impl NodeSession {
             unsent: port.unsent(),
             paused: counters.paused,
             unrecorded: self.recorder.unrecorded().messages,
-            dropped_view_frames: setup.shared.dropped_frames(),
+            dropped_view_frames: setup.shared.dropped_frames.load(Ordering::Relaxed),
             gaps,
             clock_jumps: self.epoch.jumps + sync.counts().jump + sync.pose_counts().jump,
             contacts: counts.contacts,
@@ -257,7 +258,7 @@ fn write_result(
         ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
     let (features, touches, outside) = (Some(features.as_path()), Some(touches.as_path()), setup.cut.outside.as_ref());
     let places = OutcomePlaces { mesh: &mesh, unit: setup.mesh_unit, features, touches, outside };
-    Ok(places.write(&setup.scan.0, refined, patcher)?)
+    Ok(places.write(&setup.scan.0, refined, patcher).map_err(Box::new)?)
 }
 
 /// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.

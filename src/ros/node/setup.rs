@@ -39,19 +39,18 @@ impl Setup {
     pub fn new(parameters: Parameters, clock: Clock) -> Result<Self, NodeError> {
         let scene_path = Path::new(parameters.string("scene"));
         let (scene, scene_yaml) = match scene_path.as_os_str().is_empty() {
-            true => (Scene::from_yaml(DEFAULT_SCENE)?, DEFAULT_SCENE.to_owned()),
-            false => Scene::read_with_text(scene_path)?,
+            true => (Scene::from_yaml(DEFAULT_SCENE).map_err(Box::new)?, DEFAULT_SCENE.to_owned()),
+            false => Scene::read_with_text(scene_path).map_err(Box::new)?,
         };
         let (scan_path, mesh_unit) = match parameters.string("scan") {
             "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
             path => (PathBuf::from(path), mesh_unit(&parameters)),
         };
-        let MeshFile { mesh, .. } =
-            read_mesh(&scan_path, mesh_unit).map_err(|error| NodeError::Scan(Box::new(error)))?;
+        let MeshFile { mesh, .. } = read_mesh(&scan_path, mesh_unit).map_err(Box::new)?;
         if scene.region().is_some() && parameters.string("robot") != "none" {
             return Err(NodeError::RegionWithRobot);
         }
-        let CutScan { mesh, cut } = scene.cut(mesh)?;
+        let CutScan { mesh, cut } = scene.cut(mesh).map_err(Box::new)?;
         let tree = FaceTree::new(&mesh);
         let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
         let tool = match parameters.string("tool_frame") {

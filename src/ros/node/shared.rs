@@ -19,9 +19,12 @@ pub struct Shared {
     /// the mesh as far as it was sent
     pub mesh: MeshReplica,
     parameters: Mutex<Arc<Parameters>>,
-    tiles_waiting: AtomicUsize,
-    dropped_frames: AtomicU64,
-    has_new_viewer: AtomicBool,
+    /// tiles that are still to be sent
+    pub tiles_waiting: AtomicUsize,
+    /// frames of the view that were dropped
+    pub dropped_frames: AtomicU64,
+    /// somebody joined who has no tiles yet
+    pub has_new_viewer: AtomicBool,
 }
 
 impl Shared {
@@ -48,35 +51,10 @@ impl Shared {
         *locked(&self.parameters) = Arc::new(parameters);
     }
 
-    /// So many tiles are still to be sent.
-    pub fn tiles_waiting(&self, count: usize) {
-        self.tiles_waiting.store(count, Ordering::Relaxed);
-    }
-
-    /// Tiles that are still to be sent.
-    pub fn waiting_tiles(&self) -> usize {
-        self.tiles_waiting.load(Ordering::Relaxed)
-    }
-
-    /// Somebody joined who has no tiles yet.
-    pub fn note_viewer(&self) {
-        self.has_new_viewer.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether somebody joined since this was last asked.
-    pub fn take_viewer(&self) -> bool {
-        self.has_new_viewer.swap(false, Ordering::Relaxed)
-    }
-
     /// Sends the view something that it can do without: where it has no time, that is dropped and counted.
     pub fn offer(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
         if let Err(TrySendError::Full(_)) = view.try_send(input) {
             self.dropped_frames.fetch_add(1, Ordering::Relaxed);
         }
-    }
-
-    /// Frames of the view that were dropped.
-    pub fn dropped_frames(&self) -> u64 {
-        self.dropped_frames.load(Ordering::Relaxed)
     }
 }

@@ -9,13 +9,15 @@ const RATE_OVER: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct StreamWatch {
     last: Option<Instant>,
-    arrived: u64,
+    /// messages so far
+    pub arrived: u64,
     /// times that it was stale
     pub gaps: u64,
     is_stale: bool,
     since: Instant,
     arrived_since: u64,
-    rate_hz: f64,
+    /// how many come in a second
+    pub rate_hz: f64,
 }
 
 impl StreamWatch {
@@ -42,16 +44,6 @@ impl StreamWatch {
             (self.since, self.arrived_since) = (now, self.arrived);
         }
         is_stale
-    }
-
-    /// Messages so far.
-    pub fn arrived(&self) -> u64 {
-        self.arrived
-    }
-
-    /// How many come in a second.
-    pub fn rate_hz(&self) -> f64 {
-        self.rate_hz
     }
 
     /// How long ago the last one came; `None` before the first.
@@ -133,7 +125,7 @@ mod tests {
             }
             stream.check(begun + ms * MS, 100 * MS);
             if ms % 1000 == 0 {
-                rates.push(stream.rate_hz());
+                rates.push(stream.rate_hz);
             }
         }
         assert_eq!(rates, [1000.0, 250.0, 0.0]);

@@ -1,9 +1,7 @@
 //! What an operator wants to know at the tip.
 
-use nalgebra::Point3;
-
 use super::channels::{LastTip, NextTouches};
-use super::convert::{header, point};
+use super::convert::{header, point, point_of};
 use super::feature_messages::{LETTERS, label};
 use crate::probing::plan::NextTouch;
 use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
@@ -71,10 +69,7 @@ const NEXT_LENGTH: f64 = 10e-3;
 
 /// The feature that who holds the tip is asking about.
 fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature> {
-    let far = |feature: &&Feature| {
-        let p = &feature.center;
-        (Point3::new(p.x, p.y, p.z) - tip.centre).norm()
-    };
+    let far = |feature: &&Feature| (point_of(&feature.center) - tip.centre).norm();
     let is_asked = |feature: &&Feature| {
         !feature.diameter.is_nan() || !feature.width.is_nan() || feature.status == Feature::STATUS_FLAGGED
     };

@@ -1,6 +1,7 @@
 //! The thread that shows: it follows the mesh, and sends tiles, changes, markers and diagnostics at its own pace.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
 use std::time::Duration;
 
@@ -150,7 +151,7 @@ impl View {
                 self.whole = None;
             }
         }
-        if self.shared.take_viewer() {
+        if self.shared.has_new_viewer.swap(false, Ordering::Relaxed) {
             self.tiles.renew_older_than(TILES_KEPT as u64);
         }
         let now = self.clock.now();
@@ -158,7 +159,7 @@ impl View {
         let Self { tiles, colour_by, port, .. } = self;
         let most = if is_last { usize::MAX } else { TILES_AHEAD.saturating_sub(port.tiles_waiting()) };
         tiles.take(most, now, &replica, (*colour_by, frame), |tile| port.publish(Publication::Tile(tile)));
-        self.shared.tiles_waiting(self.tiles.waiting());
+        self.shared.tiles_waiting.store(self.tiles.waiting(), Ordering::Relaxed);
         self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
     }
 }
