@@ -10,6 +10,12 @@ pub fn stamp_ns(time: Time) -> i64 {
     i64::from(time.sec) * 1_000_000_000 + i64::from(time.nanosec)
 }
 
+/// The nearest stamp that a message can have.
+pub fn time(stamp_ns: i64) -> Time {
+    let sec = stamp_ns.div_euclid(1_000_000_000).clamp(0, i64::from(i32::MAX));
+    Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32 }
+}
+
 /// The time of ROS: the system's, or that of `/clock`.
 #[derive(Debug)]
 pub struct RosClock {

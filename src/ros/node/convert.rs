@@ -2,24 +2,16 @@
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use crate::ros::clock::{self, time};
 use crate::ros::messages::{
     Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, Vector3 as Vector3Msg,
     Wrench as WrenchMsg, WrenchStamped,
 };
 use crate::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
-const NS_PER_S: i64 = 1_000_000_000;
-
 /// ns; `None` for what no message may have: before 1970, or nanoseconds that are a second or more.
 pub fn stamp_ns(time: &Time) -> Option<i64> {
-    let nanosec = i64::from(time.nanosec);
-    (time.sec >= 0 && nanosec < NS_PER_S).then(|| i64::from(time.sec) * NS_PER_S + nanosec)
-}
-
-/// The nearest that a message can have.
-pub fn time(stamp_ns: i64) -> Time {
-    let sec = stamp_ns.div_euclid(NS_PER_S).clamp(0, i64::from(i32::MAX));
-    Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(NS_PER_S) as u32 }
+    (time.sec >= 0 && time.nanosec < 1_000_000_000).then(|| clock::stamp_ns(*time))
 }
 
 /// Header of what is published in `frame`.

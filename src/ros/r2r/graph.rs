@@ -44,15 +44,17 @@ impl R2rGraph {
     where
         T: WrappedTypesupport + 'static,
     {
-        self.watch(topic, is_mesh, move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
+        let look: GraphQuery = Box::new(move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
+        self.watched.push(WatchedTopic { topic, is_mesh, look, reported: (0, None) });
     }
 
     /// A topic that we listen to.
     ///
     /// - `topic`: absolute, remapped.
     pub fn watch_senders(&mut self, topic: String, type_name: &'static str, wanted: QosProfile) {
-        self.watch(topic.clone(), false, move |node| {
-            let senders = node.get_publishers_info_by_topic(&topic, false)?;
+        let name = topic.clone();
+        let look: GraphQuery = Box::new(move |node| {
+            let senders = node.get_publishers_info_by_topic(&name, false)?;
             let misfits = senders.iter().map(|sender| {
                 misfit(type_name, &wanted, &sender.topic_type, &sender.qos_profile)
                     .map(|reason| format!("what {} sends does not fit: {reason}", sender.node_name))
@@ -60,15 +62,7 @@ impl R2rGraph {
             let misfits: Vec<String> = misfits.flatten().collect();
             Ok((senders.len() - misfits.len(), misfits.into_iter().next()))
         });
-    }
-
-    fn watch(
-        &mut self,
-        topic: String,
-        is_mesh: bool,
-        look: impl Fn(&Node) -> r2r::Result<EndpointMatch> + Send + 'static,
-    ) {
-        self.watched.push(WatchedTopic { topic, is_mesh, look: Box::new(look), reported: (0, None) });
+        self.watched.push(WatchedTopic { topic, is_mesh: false, look, reported: (0, None) });
     }
 
     /// Reports what has changed, when it is time to look again; whether ROS is still there.

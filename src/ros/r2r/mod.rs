@@ -6,8 +6,6 @@
 
 mod action;
 mod convert;
-#[cfg(test)]
-mod filled;
 mod graph;
 mod samples;
 mod services;
@@ -26,9 +24,10 @@ use r2r::{std_srvs, touchup_msgs};
 use stand_in::{std_srvs, touchup_msgs};
 
 use super::arguments::NodeConfig;
+use super::clock::time;
 use super::exchange::{self, Exchange, Joined, RosError};
 use super::locked;
-use super::messages::{Parameter, ParameterEvent, Time};
+use super::messages::{Parameter, ParameterEvent};
 use super::parameter_services::{self, raw};
 use super::parameters::ParameterValue;
 use super::port::{Arrival, Inbox, Port};
@@ -119,9 +118,8 @@ fn announce(
     let events = node.create_publisher("/parameter_events", r2r::qos::QosProfile::parameter_events());
     let (events, exchange) = (Arc::new(Mutex::new(events.during("publishing a topic")?)), exchange.clone());
     Ok(move |parameter: &str, value: &ParameterValue| {
-        let stamp_ns = exchange.clock.now_ns();
         let event = ParameterEvent {
-            stamp: Time { sec: (stamp_ns / 1_000_000_000) as i32, nanosec: (stamp_ns % 1_000_000_000) as u32 },
+            stamp: time(exchange.clock.now_ns()),
             node: name.clone(),
             changed_parameters: vec![Parameter { name: parameter.to_owned(), value: raw(Some(value)) }],
             ..ParameterEvent::default()

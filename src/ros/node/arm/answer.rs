@@ -5,12 +5,12 @@ use nalgebra::Point3;
 use crate::probing::arm::{
     ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord,
 };
-use crate::probing::execute::{Cell, Ending, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
+use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
+use crate::ros::clock::time;
 use crate::ros::messages::{
     Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time, Vector3 as Vector3Msg, Wrench as WrenchMsg,
 };
-use crate::ros::node::channels::ProbeTarget;
-use crate::ros::node::convert::{NO_VECTOR, point, pose, time, vector, vector_of};
+use crate::ros::node::convert::{NO_VECTOR, point, pose, vector, vector_of};
 use crate::ros::node::feature_messages::{flagged, found, number_of};
 
 /// Why nothing is probed where all that is flagged was asked for.
@@ -20,11 +20,11 @@ const NOWHERE: Point = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
 /// Not begun, and nothing is known of it.
 pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
     let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
-    refused(&ProbeTarget { id, kind: None, place: nowhere, radius: f64::NAN }, code, why.to_owned())
+    refused(&Flag { id, kind: None, place: nowhere, radius: f64::NAN }, code, why.to_owned())
 }
 
 /// Not begun.
-pub fn refused(target: &ProbeTarget, code: u8, message: String) -> ProbeResult {
+pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
     let kind = target.kind.map_or(0, number_of);
     ProbeResult {
         id: target.id,
@@ -37,7 +37,7 @@ pub fn refused(target: &ProbeTarget, code: u8, message: String) -> ProbeResult {
 }
 
 /// A dry run.
-pub fn planned(target: &ProbeTarget, plan: &Plan) -> ProbeResult {
+pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
     let held_back = plan.held_back.iter().map(|(touch, why)| format!("touch {touch}: {why}"));
     let (code, message) = match plan.held_back.len() {
         0 => {
@@ -51,7 +51,7 @@ pub fn planned(target: &ProbeTarget, plan: &Plan) -> ProbeResult {
 }
 
 /// What was measured.
-pub fn result_of(target: &ProbeTarget, probed: &Probed) -> ProbeResult {
+pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
     let feature = probed.found.as_ref().and_then(|found| found.feature.as_ref());
     let unknown = refused(target, 0, String::new());
     ProbeResult {
@@ -120,7 +120,7 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
 
 /// What came of the touches of a feature, one message each.
 pub fn touches_of(
-    target: &ProbeTarget,
+    target: &Flag,
     probed: &Probed,
     params: &ProbeParams,
     cell: &Cell,
