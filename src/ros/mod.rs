@@ -3,7 +3,6 @@
 //! The node knows [`port`] alone. What is behind it is chosen when the program is built.
 
 pub mod arguments;
-mod arrivals;
 pub mod clock;
 #[cfg(feature = "ros")]
 pub mod dds;

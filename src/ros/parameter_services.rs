@@ -6,13 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use super::exchange::{Exchange, RosError};
 use super::locked;
-use super::messages::{
-    self, DescribeParameters, DescribeParametersRequest, DescribeParametersResponse, FloatingPointRange,
-    GetParameterTypes, GetParameterTypesRequest, GetParameterTypesResponse, GetParameters, GetParametersRequest,
-    GetParametersResponse, ListParameters, ListParametersRequest, ListParametersResponse, ListParametersResult,
-    Parameter, SetParameters, SetParametersAtomically, SetParametersAtomicallyResponse, SetParametersResponse,
-    SetParametersResult,
-};
+use super::messages::{self, *};
 use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
 use super::port::{Arrival, Reply};
 use super::services::Serves;

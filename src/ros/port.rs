@@ -7,13 +7,7 @@ use std::fmt;
 use std::sync::mpsc::SyncSender;
 use std::time::Instant;
 
-use super::messages::{
-    Clock, DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureRequest,
-    FlagFeatureResponse, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped, PoseStamped,
-    ProbeFeatureRequest, ProbeFeatureResponse, ProbeFeedback, ProbeGoal, ProbeResponse, ProbeResult, ProbeTouch,
-    ResyncMeshRequest, ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, SetBoolRequest, SetBoolResponse,
-    TFMessage, TriggerResponse, UndoRequest, UndoResponse, UnflagFeatureRequest, UnflagFeatureResponse, WrenchStamped,
-};
+use super::messages::*;
 use super::parameters::ParameterValue;
 
 /// Tiles that a port keeps for who joins late, the latest, and that are on their way at most: 4 MB.

@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
 use super::locked;
-use super::messages::Marker;
 use super::port::Publication;
 
 /// Messages that wait at most, beside tiles: 0.4 s of mismatches at 10 kHz; a follower of the mesh sees the gap.
@@ -55,20 +54,19 @@ enum Outgoing {
 #[derive(Default)]
 struct Waiting {
     messages: VecDeque<Outgoing>,
-    tiles: VecDeque<Marker>,
+    tiles: VecDeque<Box<Publication>>,
     is_closed: bool,
 }
 
 impl Waiting {
     fn next(&mut self) -> Option<Outgoing> {
-        let tile = || self.tiles.pop_front().map(|tile| Outgoing::Publication(Box::new(Publication::Tile(tile))));
-        self.messages.pop_front().or_else(tile)
+        self.messages.pop_front().or_else(|| self.tiles.pop_front().map(Outgoing::Publication))
     }
 
-    fn put_back(&mut self, publication: Publication) {
-        match publication {
-            Publication::Tile(tile) => self.tiles.push_front(tile),
-            other => self.messages.push_front(Outgoing::Publication(Box::new(other))),
+    fn put_back(&mut self, publication: Box<Publication>) {
+        match *publication {
+            Publication::Tile(_) => self.tiles.push_front(publication),
+            _ => self.messages.push_front(Outgoing::Publication(publication)),
         }
     }
 }
@@ -78,27 +76,24 @@ impl Waiting {
 pub(super) struct SendQueue {
     waiting: Mutex<Waiting>,
     more: Condvar,
-    unsent_tiles: AtomicU64,
-    unsent_others: AtomicU64,
+    /// tiles, others
+    unsent: [AtomicU64; 2],
 }
 
 impl SendQueue {
     /// Puts a publication in.
     pub fn put(&self, publication: Publication) {
-        match publication {
-            Publication::Tile(tile) => self.put_tile(tile),
-            other => self.put_message(Outgoing::Publication(Box::new(other))),
-        }
+        self.put_in(Outgoing::Publication(Box::new(publication)));
     }
 
     /// Puts an answer in.
     pub fn answer(&self, answer: Answer) {
-        self.put_message(Outgoing::Answer(answer));
+        self.put_in(Outgoing::Answer(answer));
     }
 
     /// Not sent because nobody took them fast enough, or because ROS refused them: tiles, others.
     pub fn unsent(&self) -> [u64; 2] {
-        [&self.unsent_tiles, &self.unsent_others].map(|count| count.load(Ordering::Relaxed))
+        self.unsent.each_ref().map(|count| count.load(Ordering::Relaxed))
     }
 
     /// Tiles that wait now.
@@ -116,13 +111,13 @@ impl SendQueue {
                 }
                 Outgoing::Publication(publication) => *publication,
             };
-            let count = self.count_of(&publication);
+            let is_tile = matches!(publication, Publication::Tile(_));
             match publish(publication) {
                 Sent::Done => {}
-                Sent::Refused => _ = count.fetch_add(1, Ordering::Relaxed),
+                Sent::Refused => self.lose(is_tile),
                 Sent::Later(publication) => {
                     let mut waiting = locked(&self.waiting);
-                    waiting.put_back(publication);
+                    waiting.put_back(Box::new(publication));
                     // who leaves does not wait for who listens slowly
                     if waiting.is_closed {
                         return;
@@ -138,43 +133,32 @@ impl SendQueue {
         self.more.notify_all();
     }
 
-    fn count_of(&self, publication: &Publication) -> &AtomicU64 {
-        if matches!(publication, Publication::Tile(_)) { &self.unsent_tiles } else { &self.unsent_others }
+    fn lose(&self, is_tile: bool) {
+        self.unsent[usize::from(!is_tile)].fetch_add(1, Ordering::Relaxed);
     }
 
-    fn put_message(&self, message: Outgoing) {
+    fn put_in(&self, message: Outgoing) {
         let mut waiting = locked(&self.waiting);
-        if waiting.messages.len() < MOST {
-            waiting.messages.push_back(message);
-        } else {
-            self.unsent_others.fetch_add(1, Ordering::Relaxed);
-        }
-        drop(waiting);
-        self.more.notify_one();
-    }
-
-    fn put_tile(&self, tile: Marker) {
-        let mut waiting = locked(&self.waiting);
-        waiting.tiles.push_back(tile);
-        if waiting.tiles.len() > MOST_TILES {
-            waiting.tiles.pop_front();
-            self.unsent_tiles.fetch_add(1, Ordering::Relaxed);
+        match message {
+            Outgoing::Publication(tile) if matches!(*tile, Publication::Tile(_)) => {
+                waiting.tiles.push_back(tile);
+                if waiting.tiles.len() > MOST_TILES {
+                    waiting.tiles.pop_front();
+                    self.lose(true);
+                }
+            }
+            message if waiting.messages.len() < MOST => waiting.messages.push_back(message),
+            _ => self.lose(false),
         }
         drop(waiting);
         self.more.notify_one();
     }
 
     fn take(&self) -> Option<Outgoing> {
-        let mut waiting = locked(&self.waiting);
-        loop {
-            if let Some(message) = waiting.next() {
-                return Some(message);
-            }
-            if waiting.is_closed {
-                return None;
-            }
-            waiting = self.more.wait(waiting).unwrap_or_else(PoisonError::into_inner);
-        }
+        let is_idle =
+            |waiting: &mut Waiting| waiting.messages.is_empty() && waiting.tiles.is_empty() && !waiting.is_closed;
+        let waiting = self.more.wait_while(locked(&self.waiting), is_idle);
+        waiting.unwrap_or_else(PoisonError::into_inner).next()
     }
 }
 
@@ -183,7 +167,7 @@ mod tests {
     use std::sync::{Arc, mpsc};
 
     use super::*;
-    use crate::ros::messages::{HapticMismatch, MeshPatch};
+    use crate::ros::messages::{HapticMismatch, Marker, MeshPatch};
 
     fn tile(id: i32, x: f64) -> Publication {
         let mut marker = Marker { id, ..Marker::default() };

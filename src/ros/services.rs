@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use super::exchange::{Exchange, RosError};
-use super::messages::{
-    DetectFeatures, FlagFeature, ProbeFeature, ResyncMesh, RosService, SaveMesh, SetBool, Trigger, Undo, UnflagFeature,
-};
+use super::messages::*;
 use super::port::{Arrival, Call, Reply};
 
 /// A back end that offers services of one type.

@@ -18,8 +18,7 @@ use ros2_client::{ActionServer, ActionTypeName, Node, RmwRequestId};
 
 use super::answers::Room;
 use super::incoming::Listener;
-use super::server::SERVICE;
-use super::services::unreadable;
+use super::services::{SERVICE, unreadable};
 use super::topics::dds_name;
 use super::{During, RosError, mapping};
 use crate::ros::arguments::NodeConfig;
@@ -64,8 +63,6 @@ struct ProbeAction {
     goals: Mutex<Goals>,
 }
 
-struct ProbeListener(Arc<ProbeAction>);
-
 /// The server of the action.
 pub(super) fn server(
     config: &NodeConfig,
@@ -85,16 +82,16 @@ pub(super) fn server(
     let type_name = ActionTypeName::new("touchup_msgs", "Probe");
     let server = node.create_action_server(mapping(config), &name, &type_name, qos).during("offering an action")?;
     let probe = ProbeAction { server, exchange: exchange.clone(), room: room.clone(), goals: Mutex::default() };
-    Ok(Box::new(ProbeListener(Arc::new(probe))))
+    Ok(Box::new(Arc::new(probe)))
 }
 
-impl Listener for ProbeListener {
+impl Listener for Arc<ProbeAction> {
     fn sources(&self) -> usize {
         3
     }
 
     fn source(&mut self, number: usize) -> &mut dyn Source {
-        let probe = Arc::get_mut(&mut self.0).expect("sources are asked for before any goal is there");
+        let probe = Self::get_mut(self).expect("sources are asked for before any goal is there");
         match number {
             0 => probe.server.goal_server(),
             1 => probe.server.cancel_server(),
@@ -103,7 +100,7 @@ impl Listener for ProbeListener {
     }
 
     fn take(&mut self) {
-        let probe = &self.0;
+        let probe = &*self;
         drain(&probe.exchange, || probe.server.receive_goal(), |id, request| probe.ask(id, request));
         drain(&probe.exchange, || probe.server.receive_cancel_request(), |id, request| probe.cancel(id, &request));
         drain(&probe.exchange, || probe.server.receive_result_request(), |id, r| probe.wait_for(id, r.goal_id));

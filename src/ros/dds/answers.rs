@@ -4,7 +4,7 @@
 //! there: one that goes out in fragments is lost. So where ros2-client answers, which is the enhanced mapping (Fast DDS) and the
 //! action in either, an answer is made to fit into one packet: our own do by design but for long texts, and of parameters the caller
 //! asks for fewer at a time. What does not fit goes out as the same message with less in it, and the log says so. The services in the
-//! mapping of CycloneDDS are our own ([`super::server`]) and have no such limit.
+//! mapping of CycloneDDS are our own ([`super::services`]) and have no such limit.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,12 +15,7 @@ use ros2_client::ServiceMapping;
 use ros2_client::action::GetResultResponse;
 
 use crate::ros::locked;
-use crate::ros::messages::{
-    DescribeParametersResponse, DetectFeaturesResponse, FlagFeatureResponse, GetParameterTypesResponse,
-    GetParametersResponse, ListParametersResponse, ProbeFeatureResponse, ProbeResponse, ResyncMeshResponse,
-    SaveMeshResponse, SetBoolResponse, SetParametersAtomicallyResponse, SetParametersResponse, TriggerResponse,
-    UndoResponse, UnflagFeatureResponse,
-};
+use crate::ros::messages::*;
 
 /// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it knows no smaller one.
 pub(super) const ETHERNET: usize = 1500;
@@ -149,43 +144,29 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-impl Shrinkable for GetParametersResponse {
-    fn reduce(&mut self, _: usize) {
-        // a value for each name, or none
-        self.values.clear();
-    }
+/// Answers with a list: `lists!(Answer: list, what is left out of each of it first)`; then all of it goes.
+macro_rules! lists {
+    ($($answer:ty: $($list:ident).+, $shorten:expr;)+) => {
+        $(impl Shrinkable for $answer {
+            fn reduce(&mut self, most: usize) {
+                self.$($list).+.iter_mut().for_each($shorten);
+                if size(self) > most {
+                    self.$($list).+.clear();
+                }
+            }
+        })+
+    };
 }
 
-impl Shrinkable for GetParameterTypesResponse {
-    fn reduce(&mut self, _: usize) {
-        self.types.clear();
-    }
-}
-
-impl Shrinkable for ListParametersResponse {
-    fn reduce(&mut self, _: usize) {
-        self.result.names.clear();
-    }
-}
-
-impl Shrinkable for DescribeParametersResponse {
-    fn reduce(&mut self, most: usize) {
-        // types, ranges and words to choose from are what programs need
-        self.descriptors.iter_mut().for_each(|one| one.description.clear());
-        if size(self) > most {
-            self.descriptors.clear();
-        }
-    }
-}
-
-impl Shrinkable for SetParametersResponse {
-    fn reduce(&mut self, most: usize) {
-        // whether each is set comes before why not
-        self.results.iter_mut().for_each(|one| one.reason.clear());
-        if size(self) > most {
-            self.results.clear();
-        }
-    }
+lists! {
+    // a value for each name, or none
+    GetParametersResponse: values, |_| {};
+    GetParameterTypesResponse: types, |_| {};
+    ListParametersResponse: result.names, |_| {};
+    // types, ranges and words to choose from are what programs need
+    DescribeParametersResponse: descriptors, |one| one.description.clear();
+    // whether each is set comes before why not
+    SetParametersResponse: results, |one| one.reason.clear();
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::{Builder, JoinHandle};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ros2_client::dds::rustdds::mio1::event::Source;
@@ -41,7 +41,7 @@ const WAKE: Token = Token(usize::MAX);
 /// Starts the thread; the waker lets it look whether all is over.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
-    exchange: Arc<Exchange>,
+    exchange: &Arc<Exchange>,
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
@@ -50,7 +50,7 @@ pub(super) fn listen(
         }
     }
     let waker = Arc::new(Waker::new(poll.registry(), WAKE)?);
-    let thread = Builder::new().name("touchup-receive".to_owned()).spawn(move || {
+    let thread = exchange.thread("touchup-receive", move |exchange| {
         let mut events = Events::with_capacity(128);
         // what came before the registration wakes nobody
         listeners.iter_mut().for_each(|listener| listener.take());

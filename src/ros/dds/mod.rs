@@ -9,7 +9,6 @@ mod graph;
 mod incoming;
 mod keep_alive;
 mod samples;
-mod server;
 mod services;
 mod topics;
 
@@ -99,7 +98,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let node = Arc::new(node);
     announcing.get_or_init(|| node.clone());
     listeners.push(Box::new(graph));
-    let (waker, listening) = incoming::listen(listeners, exchange.clone())?;
+    let (waker, listening) = incoming::listen(listeners, &exchange)?;
     let mut threads = vec![listening];
     threads.extend(exchange.senders(urgent, mesh)?);
     let connection = DdsConnection { exchange: exchange.clone(), waker, threads, _node: node };

@@ -1,14 +1,22 @@
-//! Services as servers of ros2-client, or our own.
+//! Services, in the mapping of either RMW.
+//!
+//! In the enhanced mapping a server is that of ros2-client. In the mapping of CycloneDDS it is our own: that of ros2-client puts the
+//! identity of the request into the inline QoS there too, which nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
 
 use std::sync::Arc;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
-use ros2_client::{Context, Node, ReadError};
+use ros2_client::dds::rustdds::{QosPolicies, TopicKind};
+use ros2_client::qos::{History, QosProfile};
+use ros2_client::{
+    Context, Node, Publisher, ReadError, ReadResult, RmwRequestId, ServiceMapping, ServiceTypeName, Subscription,
+};
+use serde::{Deserialize, Serialize};
 
-use super::RosError;
 use super::answers::{Room, Shrinkable};
 use super::incoming::Listener;
-use super::server::Server;
+use super::topics::dds_name;
+use super::{During, RosError, mapping};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
 use crate::ros::messages::*;
@@ -87,5 +95,96 @@ where
         self.names.push(self.config.resolve(name)?);
         self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
         Ok(())
+    }
+}
+
+/// As ROS 2 has it for services: nothing is lost, calls wait for each other.
+pub(super) const SERVICE: QosProfile = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
+
+/// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before the message.
+#[derive(Clone, Serialize, Deserialize)]
+struct Headed<M> {
+    caller: u64,
+    number: i64,
+    message: M,
+}
+
+impl<M: ros2_client::Message> ros2_client::Message for Headed<M> {}
+
+/// Which call is answered.
+#[derive(Clone, Copy)]
+enum CallId {
+    Enhanced(RmwRequestId),
+    Cyclone { caller: u64, number: i64 },
+}
+
+/// Takes requests and sends answers.
+enum Server<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
+    Enhanced(ros2_client::Server<Q, A>),
+    Cyclone(Subscription<Headed<Q>>, Publisher<Headed<A>>),
+}
+
+impl<Q, A> Server<Q, A>
+where
+    Q: ros2_client::Message + Clone + 'static,
+    A: ros2_client::Message + 'static,
+{
+    /// - `name`: as in docs/ros.md
+    fn new(
+        config: &NodeConfig,
+        context: &Context,
+        node: &mut Node,
+        name: &str,
+        package: &str,
+        type_name: &str,
+    ) -> Result<Self, RosError> {
+        let (whole, mapping) = (config.resolve(name)?, mapping(config));
+        if mapping != ServiceMapping::Cyclone {
+            let type_name = ServiceTypeName::new(package, type_name);
+            let server = node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
+            return server.map(Self::Enhanced).during("offering a service");
+        }
+        let topic = |name: String, part: &str| {
+            let type_name = format!("{package}::srv::dds_::{type_name}_{part}_");
+            let qos = QosPolicies::from(&SERVICE);
+            context.domain_participant().create_topic(name, type_name, &qos, TopicKind::NoKey).during("making a topic")
+        };
+        let requests = topic(format!("rq{whole}Request"), "Request")?;
+        let answers = topic(format!("rr{whole}Reply"), "Response")?;
+        let requests = node.create_subscription(&requests, Some(SERVICE)).during("offering a service")?;
+        let answers = node.create_publisher(&answers, Some(SERVICE)).during("offering a service")?;
+        Ok(Self::Cyclone(requests, answers))
+    }
+}
+
+impl<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> Server<Q, A> {
+    fn source(&mut self) -> &mut dyn Source {
+        match self {
+            Self::Enhanced(server) => server,
+            Self::Cyclone(requests, _) => requests,
+        }
+    }
+
+    /// The next request that has come.
+    fn take(&self) -> ReadResult<Option<(CallId, Q)>> {
+        Ok(match self {
+            Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| (CallId::Enhanced(id), request)),
+            Self::Cyclone(requests, _) => requests
+                .take()?
+                .map(|(Headed { caller, number, message }, _)| (CallId::Cyclone { caller, number }, message)),
+        })
+    }
+
+    /// Answers one; an id of the other mapping there is none.
+    fn send(&self, id: CallId, message: A) -> Result<(), String> {
+        match (self, id) {
+            (Self::Enhanced(server), CallId::Enhanced(id)) => {
+                server.send_response(id, message).map_err(|error| error.to_string())
+            }
+            (Self::Cyclone(_, answers), CallId::Cyclone { caller, number }) => {
+                answers.publish(Headed { caller, number, message }).map_err(|error| error.to_string())
+            }
+            _ => Err("it was asked in another mapping".to_owned()),
+        }
     }
 }
