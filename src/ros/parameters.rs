@@ -212,18 +212,14 @@ impl ParameterDescriptor {
     pub fn check(&self, value: &ParameterValue) -> Result<ParameterValue, ParameterError> {
         let name = self.name;
         match (self.allowed, value) {
-            (Allowed::Bool(_), ParameterValue::Bool(_)) | (Allowed::String(_), ParameterValue::String(_)) => {
-                Ok(value.clone())
-            }
             (Allowed::Double(_, from, to), ParameterValue::Double(number)) => within(name, *number, from, to),
             // exact up to 2^53, far beyond every range
             (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => within(name, *whole as f64, from, to),
-            (Allowed::OneOf(_, words), ParameterValue::String(word)) if words.contains(&word.as_str()) => {
-                Ok(value.clone())
-            }
-            (Allowed::OneOf(_, words), ParameterValue::String(word)) => {
+            (Allowed::OneOf(_, words), ParameterValue::String(word)) if !words.contains(&word.as_str()) => {
                 Err(ParameterError::Word { name, value: word.clone(), words })
             }
+            (Allowed::Bool(_), ParameterValue::Bool(_))
+            | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => Ok(value.clone()),
             _ => {
                 let (wanted, given) = (self.default_value().type_name(), value.type_name());
                 Err(ParameterError::Type { name, wanted, given, value: value.clone() })

@@ -42,7 +42,7 @@ impl RefinementWorker {
     pub(super) fn call(&mut self, call: Call) {
         match call {
             Call::Flag(request, reply) => match self.flag_of(&request) {
-                Ok(flag) => self.send_flag(flag, Some(reply)),
+                Ok(flag) => self.ask_features(FeatureInput::Flag(flag, Some(reply))),
                 Err(message) => reply.send(FlagFeatureResponse { success: false, message, id: 0 }),
             },
             Call::Unflag(request, reply) => self.ask_features(FeatureInput::Unflag(request.id, reply)),
@@ -100,16 +100,15 @@ impl RefinementWorker {
         is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 
-    fn send_flag(&self, flag: FlaggedPlace, reply: Option<Reply<FlagFeatureResponse>>) {
-        self.ask_features(FeatureInput::Flag(flag, reply));
-    }
-
     /// RViz's Publish Point.
     pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
         let parameters = self.setup.shared.parameters();
         let kind = KIND_NAMES.iter().position(|name| *name == parameters.string("flag_kind")).unwrap_or(0);
         match self.point_in_object(clicked) {
-            Ok(point) => self.send_flag(FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() }, None),
+            Ok(point) => {
+                let flag = FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() };
+                self.ask_features(FeatureInput::Flag(flag, None));
+            }
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
                 self.session.counters.refuse("clicked_point");
@@ -225,14 +224,11 @@ impl RefinementWorker {
 
     /// Passes an order to the arm, or answers why it is not taken up.
     fn order_arm(&self, input: ArmInput) {
-        let (code, why, input) = match &self.arm {
-            None => (ProbeResult::NO_ARM, NO_ARM.to_owned(), input),
-            Some(arm) => match arm.order(input, self.session.folder.path()) {
-                Ok(()) => return,
-                Err((input, code, why)) => (code, why, *input),
-            },
-        };
-        input.refuse(header(self.port.now_ns(), &self.setup.shared.frame), code, &why);
+        let header = header(self.port.now_ns(), &self.setup.shared.frame);
+        match &self.arm {
+            Some(arm) => arm.order(input, self.session.folder.path(), header),
+            None => input.refuse(header, ProbeResult::NO_ARM, NO_ARM),
+        }
     }
 
     pub(super) fn set_parameter(&mut self, name: &str, value: &ParameterValue) -> Result<(), String> {

@@ -8,8 +8,9 @@ use nalgebra::Point3;
 
 use super::edits::Edits;
 use super::replica::MeshVersion;
-use crate::features::{Feature, Kind};
+use crate::features::Feature;
 use crate::live::TouchDelta;
+use crate::probing::execute::Flag;
 use crate::probing::plan::NextTouch;
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureResponse, HapticMismatch,
@@ -61,7 +62,7 @@ pub enum FeatureInput {
     /// takes that back
     Unflag(u32, Reply<UnflagFeatureResponse>),
     /// asks what is to be probed; no numbers: all that is flagged
-    Targets(Vec<u32>, SyncSender<Vec<ProbeTarget>>),
+    Targets(Vec<u32>, SyncSender<Vec<Flag>>),
     /// an arm has measured something
     Measured(Box<ArmMeasurement>),
     /// looks at the mesh now
@@ -75,19 +76,6 @@ pub struct FlaggedPlace {
     pub kind: u8,
     /// m, in O
     pub point: Point3<f64>,
-    /// how far around it, m
-    pub radius: f64,
-}
-
-/// What an arm can be sent to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProbeTarget {
-    /// by which it is known
-    pub id: u32,
-    /// `None`: nobody knows
-    pub kind: Option<Kind>,
-    /// m, in O
-    pub place: Point3<f64>,
     /// how far around it, m
     pub radius: f64,
 }

@@ -14,49 +14,43 @@ use crate::live::Quantiles;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::session::Unrecorded;
 
-/// What a state means to who watches.
-struct StreamState {
-    level: u8,
-    words: String,
-}
-
 impl RefinementWorker {
     /// Looks whether the streams come; says so when that changed.
     pub(super) fn watch_streams(&mut self) {
-        let state = self.state();
+        let (level, words) = self.state();
         // ages in it grow: what is said once is said until something else is
-        let name = state.words.split(':').next().unwrap_or_default().to_owned();
+        let name = words.split(':').next().unwrap_or_default().to_owned();
         if name != self.last_state {
-            match state.level {
-                DiagnosticStatus::OK => info!("{}", state.words),
-                _ => warn!("{}", state.words),
+            match level {
+                DiagnosticStatus::OK => info!("{words}"),
+                _ => warn!("{words}"),
             }
             self.last_state = name;
         }
     }
 
-    fn state(&mut self) -> StreamState {
+    /// What a state means to who watches: a level of [`DiagnosticStatus`], and in words.
+    fn state(&mut self) -> (u8, String) {
         let now = self.setup.clock.now();
         let stale = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         let is_stale = self.streams.each_mut().map(|stream| stream.check(now, stale));
-        let said = |level, words: String| StreamState { level, words };
         if let Some(fault) = &self.fault {
-            return said(DiagnosticStatus::ERROR, format!("stopped: {fault}"));
+            return (DiagnosticStatus::ERROR, format!("stopped: {fault}"));
         }
         if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.session.recorder.unrecorded() {
             let words = format!("does not record, make room on the disk and it goes on: {reason}");
-            return said(DiagnosticStatus::ERROR, words);
+            return (DiagnosticStatus::ERROR, words);
         }
         if self.is_paused {
-            return said(DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
+            return (DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
         }
         if let Some((_, why)) =
             self.lost_transform.as_ref().filter(|(at, _)| now.saturating_duration_since(*at) < stale)
         {
-            return said(DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
+            return (DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
         }
         if self.streams.iter().all(|stream| stream.arrived == 0) {
-            return said(DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
+            return (DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
         }
         let late = ["pose", "wrench"].iter().zip(&self.streams).zip(is_stale).filter(|(_, late)| *late);
         let ages = late.map(|((name, stream), _)| match stream.age(now) {
@@ -65,8 +59,8 @@ impl RefinementWorker {
         });
         let ages: Vec<_> = ages.collect();
         match ages.is_empty() {
-            false => said(DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", "))),
-            true => said(DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
+            false => (DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", "))),
+            true => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
         }
     }
 
@@ -76,7 +70,7 @@ impl RefinementWorker {
     }
 
     pub(super) fn publish_diagnostics(&mut self) {
-        let StreamState { level, words } = self.state();
+        let (level, words) = self.state();
         let report = self.report();
         let status = |name: &str, message: String, values| DiagnosticStatus {
             level,

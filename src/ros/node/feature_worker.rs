@@ -7,13 +7,14 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 
-use super::channels::{ArmMeasurement, FeatureInput, FlaggedPlace, NextTouches, ProbeTarget, ViewInput};
+use super::channels::{ArmMeasurement, FeatureInput, FlaggedPlace, NextTouches, ViewInput};
 use super::convert::header;
 use super::feature_messages::{self, KIND_NAMES, flagged, found};
 use super::shared::Shared;
 use crate::clock::Clock;
 use crate::features::{Feature, Tracker};
 use crate::mesh::{FaceTree, MeshError};
+use crate::probing::execute::Flag;
 use crate::probing::plan::{NextTouch, advise_next_touch};
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
@@ -240,9 +241,9 @@ impl FeatureWorker {
     }
 
     /// What is flagged, or has one of these numbers.
-    fn targets(&self, ids: &[u32]) -> Vec<ProbeTarget> {
+    fn targets(&self, ids: &[u32]) -> Vec<Flag> {
         let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
-        let places = self.flags.iter().map(|(&id, flag)| ProbeTarget {
+        let places = self.flags.iter().map(|(&id, flag)| Flag {
             id,
             kind: feature_messages::kind_of(flag.kind),
             place: flag.point,
@@ -251,9 +252,9 @@ impl FeatureWorker {
         let found = self.tracker.features().iter().map(|feature| {
             let id = self.name_of(feature);
             let (kind, place, radius) = (Some(feature.kind), feature.centre.value, self.radii.get(&id).copied());
-            (radius.is_some(), ProbeTarget { id, kind, place, radius: radius.unwrap_or(default) })
+            (radius.is_some(), Flag { id, kind, place, radius: radius.unwrap_or(default) })
         });
-        let is_wanted = |target: &ProbeTarget, is_flagged: bool| match ids.is_empty() {
+        let is_wanted = |target: &Flag, is_flagged: bool| match ids.is_empty() {
             true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),
             false => ids.contains(&target.id),
         };

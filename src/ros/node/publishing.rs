@@ -9,7 +9,7 @@ use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::convert::{NO_VECTOR, header, point, vector};
 use super::edits::Edits;
 use super::refinement::RefinementWorker;
-use crate::haptic::{Case, Update};
+use crate::haptic::{Case, Mismatch, Update};
 use crate::ros::messages::HapticMismatch;
 
 /// The distance at the tip is looked up so often.
@@ -42,29 +42,19 @@ impl RefinementWorker {
         }
         self.mismatch_ns = tip.stamp_ns;
         let centre = tip.pose_ot.translation.vector.into();
-        let base = HapticMismatch {
+        let found = update.mismatch.as_ref();
+        let of = |part: fn(&Mismatch) -> Vector3<f64>| found.map_or(NO_VECTOR, |found| vector(&part(found)));
+        let message = HapticMismatch {
             header: header(tip.stamp_ns, &self.setup.shared.frame),
             contact_case: number_of(update.case),
-            face: HapticMismatch::NO_FACE,
+            face: found.map_or(HapticMismatch::NO_FACE, |found| found.face.0),
             mesh_version: self.session.version,
             tip: point(&centre),
-            actual_force: vector(&tip.force_o),
-            expected_force: NO_VECTOR,
-            linear: NO_VECTOR,
-            rotational: NO_VECTOR,
-            signed_distance: f64::NAN,
-        };
-        let message = match &update.mismatch {
-            None => base,
-            Some(mismatch) => HapticMismatch {
-                face: mismatch.face.0,
-                actual_force: vector(&(mismatch.expected_force_o + mismatch.linear)),
-                expected_force: vector(&mismatch.expected_force_o),
-                linear: vector(&mismatch.linear),
-                rotational: vector(&mismatch.rotational),
-                signed_distance: mismatch.distance,
-                ..base
-            },
+            actual_force: vector(&found.map_or(tip.force_o, |found| found.expected_force_o + found.linear)),
+            expected_force: of(|found| found.expected_force_o),
+            linear: of(|found| found.linear),
+            rotational: of(|found| found.rotational),
+            signed_distance: found.map_or(f64::NAN, |found| found.distance),
         };
         self.setup.shared.offer(&self.view, ViewInput::Mismatch(message));
         let now = self.setup.clock.now();

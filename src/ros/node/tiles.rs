@@ -153,13 +153,8 @@ impl Tiles {
         mut each: impl FnMut(Marker),
     ) {
         for _ in 0..most {
-            let (tile, has_changed) = match (self.changed.pop(), &mut self.again) {
-                (Some(tile), _) => (tile, true),
-                (None, again) => match again.pop() {
-                    Some(tile) => (tile, false),
-                    None => return,
-                },
-            };
+            let changed = self.changed.pop();
+            let Some(tile) = changed.or_else(|| self.again.pop()) else { return };
             let at = tile as usize;
             if at >= self.is_drawn.len() {
                 self.is_drawn.resize(at + 1, false);
@@ -167,7 +162,7 @@ impl Tiles {
             }
             let marker = drawn(tile, replica, by, &self.mismatch, frame);
             let is_empty = marker.points.is_empty();
-            let is_repeated = !has_changed && self.sent_as[at] > 0;
+            let is_repeated = changed.is_none() && self.sent_as[at] > 0;
             if !is_empty || self.is_drawn[at] || is_repeated {
                 self.is_drawn[at] = !is_empty;
                 self.sent += 1;

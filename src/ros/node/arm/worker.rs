@@ -22,7 +22,7 @@ use crate::ros::messages::{
     Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse,
     ProbeResult, ProbeSettings, TriggerResponse,
 };
-use crate::ros::node::channels::{ArmMeasurement, FeatureInput, ProbeTarget};
+use crate::ros::node::channels::{ArmMeasurement, FeatureInput};
 use crate::ros::node::convert::{header, point};
 use crate::ros::node::error::NodeError;
 use crate::ros::node::setup::Setup;
@@ -115,29 +115,24 @@ impl Drop for ArmHandle {
 }
 
 impl ArmHandle {
-    /// Gives an order.
+    /// Gives an order, or answers why it cannot be taken up.
     ///
     /// - `folder`: of the session, where what is touched is written down.
-    ///
-    /// # Errors
-    /// The order, when it cannot be taken up; a code of [`ProbeResult`], and why.
-    pub fn order(&self, input: ArmInput, folder: &Path) -> Result<(), (Box<ArmInput>, u8, String)> {
-        let busy = |input| (Box::new(input), ProbeResult::BUSY, BUSY.to_owned());
+    pub fn order(&self, input: ArmInput, folder: &Path, header: Header) {
         if !self.common.begin() {
-            return Err(busy(input));
+            return input.refuse(header, ProbeResult::BUSY, BUSY);
         }
         let order = ArmOrder { input, folder: folder.to_owned() };
-        self.inputs.try_send(order).map_err(|error| {
-            self.common.done();
-            match error {
-                TrySendError::Full(order) => busy(order.input),
-                // its thread has ended, and has said why
-                TrySendError::Disconnected(order) => {
-                    let why = self.common.ready().err().unwrap_or_else(|| "the thread of the arm has ended".to_owned());
-                    (Box::new(order.input), ProbeResult::ARM_NOT_READY, why)
-                }
+        let Err(error) = self.inputs.try_send(order) else { return };
+        self.common.done();
+        match error {
+            TrySendError::Full(order) => order.input.refuse(header, ProbeResult::BUSY, BUSY),
+            // its thread has ended, and has said why
+            TrySendError::Disconnected(order) => {
+                let why = self.common.ready().err().unwrap_or_else(|| "the thread of the arm has ended".to_owned());
+                order.input.refuse(header, ProbeResult::ARM_NOT_READY, &why);
             }
-        })
+        }
     }
 
     /// `~/arm_state`: answered at once, whatever the arm does.
@@ -365,7 +360,7 @@ impl ArmWorker {
     }
 
     /// What is flagged, in the order that was asked for, or nearest first.
-    fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<ProbeTarget>, Box<ProbeResult>> {
+    fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<Flag>, Box<ProbeResult>> {
         let (to, targets) = sync_channel(1);
         let asked = self.features.try_send(FeatureInput::Targets(ids.to_vec(), to));
         let answer = asked.ok().and_then(|()| self.wait(arm, &targets));
@@ -377,13 +372,13 @@ impl ArmWorker {
         }
         if ids.is_empty() {
             let tip = self.link.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
-            let far = |target: &ProbeTarget| (target.place - tip).norm();
+            let far = |target: &Flag| (target.place - tip).norm();
             targets.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
         Ok(targets)
     }
 
-    fn wanted(&self, settings: &ProbeSettings, target: &ProbeTarget) -> Result<Wanted, (u8, String)> {
+    fn wanted(&self, settings: &ProbeSettings, target: &Flag) -> Result<Wanted, (u8, String)> {
         let wanted = Wanted::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
             let scene_allows = self.link.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
@@ -404,7 +399,7 @@ impl ArmWorker {
     fn probe_one(
         &mut self,
         folder: &Path,
-        target: &ProbeTarget,
+        target: &Flag,
         wanted: &Wanted,
         arm: &mut dyn Arm,
         watched: Option<GoalWatcher<'_>>,
@@ -412,8 +407,7 @@ impl ArmWorker {
     ) -> ProbeResult {
         let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
         let Some(state) = self.link.common.last() else { return not_ready("nothing has come from the arm yet") };
-        let flag = Flag { id: target.id, kind: target.kind, place: target.place, radius: target.radius };
-        let (cell, params) = (self.cell.clone(), wanted.params.clone());
+        let (cell, params, flag) = (self.cell.clone(), wanted.params.clone(), *target);
         let ready = ask_mesh(&self.link.setup, move |still| {
             let planned = plan(&cell, &params, &still, &flag, &state);
             (still, planned)
@@ -437,7 +431,7 @@ impl ArmWorker {
             // there is no such pattern, or no such number
             Err(error) => return refused(target, ProbeResult::BAD_REQUEST, format!("nothing is planned: {error}")),
         }
-        let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(&flag);
+        let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(target);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {
             self.link.common.stop(&probed.ending.to_string());

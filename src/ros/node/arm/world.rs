@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use std::thread::Builder;
 use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
@@ -16,6 +15,7 @@ use crate::ros::messages::ProbeFeedback;
 use crate::ros::node::convert::{as_pose, as_wrench};
 use crate::ros::node::frame_resolver::CELL;
 use crate::ros::node::setup::Setup;
+use crate::ros::node::side_work::begin;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
@@ -32,18 +32,17 @@ pub fn ask_mesh<T: Send + 'static>(
 ) -> Receiver<T> {
     let (to, ready) = sync_channel(1);
     let snapshot = shared.mesh.complete();
-    let (working, clock) = (clock.begin_work(), clock.clone());
+    let waiting = clock.clone();
     let make = move || {
         // the snapshot goes at once: the next version of the mesh need not be a copy
-        let mesh = clock.recv_timeout(&snapshot, COPY_WAIT).ok().and_then(|snapshot| snapshot.mesh().ok());
+        let mesh = waiting.recv_timeout(&snapshot, COPY_WAIT).ok().and_then(|snapshot| snapshot.mesh().ok());
         if let Some(mesh) = mesh {
             // who asked may have gone
             let _ = to.send(make_of(StaticWorld::new(mesh)));
         }
-        drop(working);
     };
     // without a thread the receiver finds its sender gone, as it does where nothing comes
-    let _ = Builder::new().name("arm mesh".to_owned()).spawn(make);
+    let _ = begin(clock, "arm mesh", make);
     ready
 }
 
