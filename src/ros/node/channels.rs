@@ -6,8 +6,7 @@ use std::sync::mpsc::SyncSender;
 
 use nalgebra::Point3;
 
-use super::edits::Edits;
-use super::replica::MeshVersion;
+use super::replica::{Edits, MeshVersion};
 use crate::features::Feature;
 use crate::live::TouchDelta;
 use crate::probing::execute::Flag;

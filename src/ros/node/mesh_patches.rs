@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use super::convert::header;
-use super::edits::Edits;
-use super::replica::MeshVersion;
+use super::replica::{Edits, MeshVersion};
 use crate::mesh::IdSet;
 use crate::reconstruct::Support;
 use crate::ros::messages::MeshPatch;

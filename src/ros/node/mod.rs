@@ -9,7 +9,6 @@ mod calls;
 mod channels;
 mod convert;
 mod diagnostics;
-mod edits;
 mod error;
 mod feature_messages;
 mod feature_worker;

@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::convert::{NO_VECTOR, header, point, vector};
-use super::edits::Edits;
 use super::refinement::RefinementWorker;
+use super::replica::Edits;
 use crate::haptic::{Case, Mismatch, Update};
 use crate::ros::messages::HapticMismatch;
 

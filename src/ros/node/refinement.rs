@@ -12,9 +12,9 @@ use tracing::warn;
 
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
-use super::edits::Edits;
 use super::error::NodeError;
 use super::frame_resolver::{FrameResolver, Refusal};
+use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;

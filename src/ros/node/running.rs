@@ -6,10 +6,10 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
 use super::arm::{self, ArmOfNode};
-use super::edits::Edits;
 use super::error::NodeError;
 use super::feature_worker::FeatureWorker;
 use super::refinement::RefinementWorker;
+use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::begin;

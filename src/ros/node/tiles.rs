@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 use nalgebra::{Point3, Vector3};
 
 use super::convert::{header, point};
-use super::edits::FACES_OF_A_TILE;
-use super::replica::MeshVersion;
+use super::replica::{FACES_OF_A_TILE, MeshVersion};
 use crate::reconstruct::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 

@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
 use std::time::Duration;
 
 use super::channels::{LastTip, NextTouches, ViewInput};
-use super::edits::Edits;
 use super::feature_messages;
 use super::mesh_patches::MeshPatches;
+use super::replica::Edits;
 use super::shared::Shared;
 use super::tiles::{ColourBy, Tiles};
 use super::tip;

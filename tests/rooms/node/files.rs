@@ -19,7 +19,7 @@ fn files(folder: &Path, module: &str, into: &mut BTreeMap<String, String>) {
     }
 }
 
-/// The files that one names: `use super::edits::Edits` in `node::tiles` is `node::edits`.
+/// The files that one names: `use super::replica::Edits` in `node::view` is `node::replica`.
 fn used(name: &str, text: &str, known: &BTreeSet<String>) -> BTreeSet<String> {
     let parent = name.rsplit_once("::").map_or("", |(parent, _)| parent);
     let paths = text.lines().filter_map(|line| {
