@@ -16,43 +16,36 @@ pub(super) trait Serves<S: RosService> {
     ) -> Result<(), RosError>;
 }
 
-/// Offers all; what is asked goes to the inbox of the node.
-pub(super) fn serve<B>(back_end: &mut B, exchange: &Arc<Exchange>) -> Result<(), RosError>
-where
-    B: Serves<FlagFeature>
-        + Serves<UnflagFeature>
-        + Serves<DetectFeatures>
-        + Serves<SaveMesh>
-        + Serves<ResyncMesh>
-        + Serves<Undo>
-        + Serves<Trigger>
-        + Serves<SetBool>
-        + Serves<ProbeFeature>,
-{
-    macro_rules! serve {
-        ($($name:literal: $service:ident, $call:expr;)+) => {
+macro_rules! services {
+    ($($name:literal: $service:ident, $call:expr;)+) => {
+        /// Offers all; what is asked goes to the inbox of the node.
+        pub(super) fn serve<B>(back_end: &mut B, exchange: &Arc<Exchange>) -> Result<(), RosError>
+        where
+            $(B: Serves<$service>,)+
+        {
             $(let to = exchange.clone();
             <B as Serves<$service>>::serve(back_end, $name, move |request, reply| {
                 to.arrivals.put(Arrival::Call($call(request, reply)));
             })?;)+
-        };
-    }
-    serve! {
-        "~/flag_feature": FlagFeature, Call::Flag;
-        "~/unflag_feature": UnflagFeature, Call::Unflag;
-        "~/detect_features": DetectFeatures, Call::Detect;
-        "~/save_mesh": SaveMesh, Call::Save;
-        "~/resync_mesh": ResyncMesh, Call::Resync;
-        "~/undo": Undo, Call::Undo;
-        "~/redo": Undo, Call::Redo;
-        "~/reset": Trigger, |_, reply| Call::Reset(reply);
-        "~/pause": SetBool, Call::Pause;
-        "~/probe_all": Trigger, |_, reply| Call::ProbeAll(reply);
-        "~/recover": Trigger, |_, reply| Call::Recover(reply);
-        "~/arm_state": Trigger, |_, reply| Call::ArmState(reply);
-        "~/probe_feature": ProbeFeature, Call::ProbeFeature;
-    }
-    Ok(())
+            Ok(())
+        }
+    };
+}
+
+services! {
+    "~/flag_feature": FlagFeature, Call::Flag;
+    "~/unflag_feature": UnflagFeature, Call::Unflag;
+    "~/detect_features": DetectFeatures, Call::Detect;
+    "~/save_mesh": SaveMesh, Call::Save;
+    "~/resync_mesh": ResyncMesh, Call::Resync;
+    "~/undo": Undo, Call::Undo;
+    "~/redo": Undo, Call::Redo;
+    "~/reset": Trigger, |_, reply| Call::Reset(reply);
+    "~/pause": SetBool, Call::Pause;
+    "~/probe_all": Trigger, |_, reply| Call::ProbeAll(reply);
+    "~/recover": Trigger, |_, reply| Call::Recover(reply);
+    "~/arm_state": Trigger, |_, reply| Call::ArmState(reply);
+    "~/probe_feature": ProbeFeature, Call::ProbeFeature;
 }
 
 /// The action.

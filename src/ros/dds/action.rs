@@ -14,14 +14,13 @@ use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatus, GoalStatusArr
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::qos::{Durability, History};
-use ros2_client::{ActionServer, ActionTypeName, Node, RmwRequestId};
+use ros2_client::{ActionServer, ActionTypeName, RmwRequestId};
 
 use super::answers::Room;
 use super::incoming::Listener;
 use super::services::{SERVICE, unreadable};
 use super::topics::dds_name;
-use super::{During, RosError, mapping};
-use crate::ros::arguments::NodeConfig;
+use super::{DdsBackEnd, During, RosError, mapping};
 use crate::ros::exchange::Exchange;
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
@@ -64,12 +63,8 @@ struct ProbeAction {
 }
 
 /// The server of the action.
-pub(super) fn server(
-    config: &NodeConfig,
-    node: &mut Node,
-    exchange: &Arc<Exchange>,
-    room: &Arc<Room>,
-) -> Result<Box<dyn Listener>, RosError> {
+pub(super) fn server(back_end: &mut DdsBackEnd<'_>) -> Result<Box<dyn Listener>, RosError> {
+    let DdsBackEnd { config, node, exchange, room, .. } = back_end;
     let latched = SERVICE.durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
     let qos = ActionServerQosPolicies {
         goal_service: SERVICE,

@@ -20,6 +20,8 @@ use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
 
 use self::answers::Room;
+use self::graph::DdsGraph;
+use self::incoming::Listener;
 use super::arguments::NodeConfig;
 use super::exchange::{self, Exchange, Joined, RosError};
 use super::parameter_services;
@@ -38,6 +40,19 @@ impl<T, E: Debug> During<T> for Result<T, E> {
         let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
         self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
     }
+}
+
+/// Publishes, subscribes and serves.
+struct DdsBackEnd<'a> {
+    config: &'a NodeConfig,
+    context: Context,
+    node: Node,
+    graph: DdsGraph,
+    exchange: Arc<Exchange>,
+    room: Arc<Room>,
+    /// of the services so far, absolute and remapped
+    names: Vec<String>,
+    listeners: Vec<Box<dyn Listener>>,
 }
 
 struct DdsConnection {
@@ -64,27 +79,23 @@ impl Drop for DdsConnection {
 /// [`RosError`]: a name that is none, no network, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let exchange = Exchange::new(config, inbox);
-    let room = Arc::new(Room::new(&mapping(config)));
     // its own parameter services know one mapping alone, and nothing of ranges
     let options = declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
-    let (context, mut node) = join(config, options)?;
-    let mut graph = graph::DdsGraph::new(&context, &exchange, config);
-    let mut topics =
-        topics::DdsTopics { config, node: &mut node, graph: &mut graph, exchange: &exchange, listeners: Vec::new() };
-    let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
-    subscribe(config, &mut topics)?;
-    let listeners = topics.listeners;
-    let mut services = services::DdsServices {
+    let (context, node) = join(config, options)?;
+    let mut back_end = DdsBackEnd {
         config,
-        context: &context,
-        node: &mut node,
-        exchange: &exchange,
-        room: &room,
+        graph: DdsGraph::new(&context, &exchange, config),
+        context,
+        node,
+        exchange: exchange.clone(),
+        room: Arc::new(Room::new(&mapping(config))),
         names: Vec::new(),
-        listeners,
+        listeners: Vec::new(),
     };
-    super::services::serve(&mut services, &exchange)?;
-    graph.services = std::mem::take(&mut services.names);
+    let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
+    subscribe(config, &mut back_end)?;
+    super::services::serve(&mut back_end, &exchange)?;
+    back_end.graph.services = back_end.names.clone();
     let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
     let announce = announcing.clone();
     let announce = move |name: &str, value: &ParameterValue| {
@@ -92,9 +103,10 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
             tracing::warn!(name, reason, "a change of a parameter is not announced");
         }
     };
-    parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
-    let mut listeners = services.listeners;
-    listeners.push(action::server(config, &mut node, &exchange, &room)?);
+    parameter_services::serve(&mut back_end, &exchange, &config.parameters, Box::new(announce))?;
+    let probe = action::server(&mut back_end)?;
+    let DdsBackEnd { node, graph, mut listeners, .. } = back_end;
+    listeners.push(probe);
     let node = Arc::new(node);
     announcing.get_or_init(|| node.clone());
     listeners.push(Box::new(graph));

@@ -8,16 +8,13 @@ use std::sync::Arc;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::{QosPolicies, TopicKind};
 use ros2_client::qos::{History, QosProfile};
-use ros2_client::{
-    Context, Node, Publisher, ReadError, ReadResult, RmwRequestId, ServiceMapping, ServiceTypeName, Subscription,
-};
+use ros2_client::{Publisher, ReadError, ReadResult, RmwRequestId, ServiceMapping, ServiceTypeName, Subscription};
 use serde::{Deserialize, Serialize};
 
 use super::answers::{Room, Shrinkable};
 use super::incoming::Listener;
 use super::topics::dds_name;
-use super::{During, RosError, mapping};
-use crate::ros::arguments::NodeConfig;
+use super::{DdsBackEnd, During, RosError, mapping};
 use crate::ros::exchange::Exchange;
 use crate::ros::messages::*;
 use crate::ros::port::{Arrival, Reply};
@@ -67,19 +64,7 @@ pub(super) fn unreadable(name: &'static str, exchange: &Exchange, error: &ReadEr
     exchange.arrivals.put(Arrival::Unreadable(name, reason));
 }
 
-/// Makes servers.
-pub(super) struct DdsServices<'a> {
-    pub config: &'a NodeConfig,
-    pub context: &'a Context,
-    pub node: &'a mut Node,
-    pub exchange: &'a Arc<Exchange>,
-    pub room: &'a Arc<Room>,
-    /// of those that are served so far, absolute and remapped
-    pub names: Vec<String>,
-    pub listeners: Vec<Box<dyn Listener>>,
-}
-
-impl<S> Serves<S> for DdsServices<'_>
+impl<S> Serves<S> for DdsBackEnd<'_>
 where
     S: RosService<Request: ros2_client::Message, Response: Shrinkable>,
 {
@@ -88,9 +73,7 @@ where
         name: &'static str,
         call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<(), RosError> {
-        let [package, type_name] = S::TYPE_NAME;
-        let server =
-            Server::<S::Request, S::Response>::new(self.config, self.context, self.node, name, package, type_name);
+        let server = Server::<S::Request, S::Response>::new(self, name, S::TYPE_NAME);
         let (server, exchange, room) = (Arc::new(server?), self.exchange.clone(), self.room.clone());
         self.names.push(self.config.resolve(name)?);
         self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
@@ -130,14 +113,8 @@ where
     A: ros2_client::Message + 'static,
 {
     /// - `name`: as in docs/ros.md
-    fn new(
-        config: &NodeConfig,
-        context: &Context,
-        node: &mut Node,
-        name: &str,
-        package: &str,
-        type_name: &str,
-    ) -> Result<Self, RosError> {
+    fn new(back_end: &mut DdsBackEnd<'_>, name: &str, [package, type_name]: [&str; 2]) -> Result<Self, RosError> {
+        let DdsBackEnd { config, context, node, .. } = back_end;
         let (whole, mapping) = (config.resolve(name)?, mapping(config));
         if mapping != ServiceMapping::Cyclone {
             let type_name = ServiceTypeName::new(package, type_name);

@@ -1,17 +1,13 @@
 //! Topics as writers and readers of DDS.
 
-use std::sync::Arc;
-
 use ros2_client::dds::rustdds::policy::ResourceLimits;
 use ros2_client::dds::rustdds::qos::HasQoSPolicy;
 use ros2_client::dds::rustdds::{self, QosPolicyBuilder, TopicDescription, TopicKind};
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, WriteError};
 
-use super::graph::DdsGraph;
-use super::incoming::{HeardTopic, LastNumbers, Listener};
-use super::{During, RosError};
-use crate::ros::arguments::NodeConfig;
+use super::incoming::{HeardTopic, LastNumbers};
+use super::{DdsBackEnd, During, RosError};
 use crate::ros::exchange::Exchange;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::{Arrival, TILES_KEPT};
@@ -47,25 +43,16 @@ fn limit(topic: Topic) -> Option<usize> {
     [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)].into_iter().find(|(one, _)| *one == topic).map(|(_, most)| most)
 }
 
-/// Publishes and subscribes.
-pub(super) struct DdsTopics<'a> {
-    pub config: &'a NodeConfig,
-    pub node: &'a mut Node,
-    pub graph: &'a mut DdsGraph,
-    pub exchange: &'a Arc<Exchange>,
-    pub listeners: Vec<Box<dyn Listener>>,
-}
-
-impl DdsTopics<'_> {
+impl DdsBackEnd<'_> {
     fn announce<M: RosMessage>(&mut self, name: &str, qos: &QosProfile) -> Result<rustdds::Topic, RosError> {
         let whole = self.config.resolve(name)?;
-        let topic = make_topic::<M>(self.node, &whole, qos)?;
+        let topic = make_topic::<M>(&self.node, &whole, qos)?;
         self.graph.name(&topic, whole);
         Ok(topic)
     }
 }
 
-impl<M: RosMessage> Publishes<M> for DdsTopics<'_> {
+impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
         let profile = profile(topic);
         let mut announced = self.announce::<M>(topic.name, &profile)?;
@@ -88,7 +75,7 @@ impl<M: RosMessage> Publishes<M> for DdsTopics<'_> {
     }
 }
 
-impl<M: RosMessage> Subscribes<M> for DdsTopics<'_> {
+impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
         let profile = profile(topic);
         let announced = self.announce::<M>(topic.name, &profile)?;

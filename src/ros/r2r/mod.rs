@@ -33,6 +33,7 @@ use super::parameters::ParameterValue;
 use super::port::{Arrival, Inbox, Port};
 use super::topics::{mesh, subscribe, urgent};
 use convert::Convert;
+use graph::R2rGraph;
 pub use samples::samples;
 
 /// Says what rcl was asked for, where it refuses.
@@ -65,6 +66,15 @@ where
     })
 }
 
+/// Publishes, subscribes and serves.
+struct R2rBackEnd<'a> {
+    config: &'a NodeConfig,
+    node: r2r::Node,
+    graph: R2rGraph,
+    exchange: Arc<Exchange>,
+    sources: Vec<PollSource>,
+}
+
 struct R2rConnection {
     exchange: Arc<Exchange>,
     sending: Vec<JoinHandle<()>>,
@@ -89,18 +99,14 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let exchange = Exchange::new(config, inbox);
     let context = context()?;
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
-    let mut node = node.during("making the node")?;
-    let mut graph = graph::R2rGraph::new(context);
-    let mut topics =
-        topics::R2rTopics { config, node: &mut node, graph: &mut graph, exchange: &exchange, sources: Vec::new() };
-    let (mesh, urgent) = (mesh(&mut topics)?, urgent(&mut topics)?);
-    subscribe(config, &mut topics)?;
-    let sources = topics.sources;
-    let announce = announce(&mut node, config.place.full_name(), &exchange)?;
-    let mut services = services::R2rServices { node: &mut node, exchange: &exchange, sources };
-    super::services::serve(&mut services, &exchange)?;
-    parameter_services::serve(&mut services, &exchange, &config.parameters, Box::new(announce))?;
-    let mut sources = services.sources;
+    let (node, graph) = (node.during("making the node")?, R2rGraph::new(context));
+    let mut back_end = R2rBackEnd { config, node, graph, exchange: exchange.clone(), sources: Vec::new() };
+    let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
+    subscribe(config, &mut back_end)?;
+    let announce = announce(&mut back_end.node, config.place.full_name(), &exchange)?;
+    super::services::serve(&mut back_end, &exchange)?;
+    parameter_services::serve(&mut back_end, &exchange, &config.parameters, Box::new(announce))?;
+    let R2rBackEnd { mut node, graph, mut sources, .. } = back_end;
     sources.extend(action::server(&mut node, &exchange)?);
     let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };
     let spinning = exchange.thread("touchup-spin", move |exchange| spin(node, sources, graph, exchange))?;
@@ -154,7 +160,7 @@ const MOST_IN_VAIN: u32 = 160;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// The thread that takes what comes. There is always a subscription, or rcl would not wait at all (r2r issue 93).
-fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: graph::R2rGraph, exchange: &Exchange) {
+fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: R2rGraph, exchange: &Exchange) {
     let _reports_end = ReportsEnd(exchange);
     let mut in_vain = 0;
     while !exchange.arrivals.is_over() {

@@ -1,24 +1,14 @@
 //! Services as servers of r2r.
 
-use std::sync::Arc;
-
+use r2r::ServiceRequest;
 use r2r::qos::QosProfile;
-use r2r::{Node, ServiceRequest};
 
 use super::convert::{Convert, R2rService};
-use super::{During, PollSource, RosError, source};
-use crate::ros::exchange::Exchange;
+use super::{During, R2rBackEnd, RosError, source};
 use crate::ros::port::Reply;
 use crate::ros::services::Serves;
 
-/// Makes servers.
-pub(super) struct R2rServices<'a> {
-    pub node: &'a mut Node,
-    pub exchange: &'a Arc<Exchange>,
-    pub sources: Vec<PollSource>,
-}
-
-impl<S: R2rService> Serves<S> for R2rServices<'_> {
+impl<S: R2rService> Serves<S> for R2rBackEnd<'_> {
     fn serve(
         &mut self,
         name: &'static str,

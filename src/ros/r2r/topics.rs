@@ -1,14 +1,10 @@
 //! Topics as publishers and subscriptions of r2r.
 
-use std::sync::Arc;
-
+use r2r::WrappedTypesupport;
 use r2r::qos::QosProfile;
-use r2r::{Node, WrappedTypesupport};
 
 use super::convert::Convert;
-use super::graph::R2rGraph;
-use super::{During, PollSource, RosError, source};
-use crate::ros::arguments::NodeConfig;
+use super::{During, R2rBackEnd, RosError, source};
 use crate::ros::exchange::Exchange;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
@@ -21,16 +17,7 @@ pub(super) fn profile(topic: Topic) -> QosProfile {
     profile.keep_last(topic.depth)
 }
 
-/// Publishes and subscribes.
-pub(super) struct R2rTopics<'a> {
-    pub config: &'a NodeConfig,
-    pub node: &'a mut Node,
-    pub graph: &'a mut R2rGraph,
-    pub exchange: &'a Arc<Exchange>,
-    pub sources: Vec<PollSource>,
-}
-
-impl<M> Publishes<M> for R2rTopics<'_>
+impl<M> Publishes<M> for R2rBackEnd<'_>
 where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + 'static>,
 {
@@ -48,7 +35,7 @@ where
     }
 }
 
-impl<M> Subscribes<M> for R2rTopics<'_>
+impl<M> Subscribes<M> for R2rBackEnd<'_>
 where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + Send + 'static>,
 {
