@@ -96,7 +96,9 @@ impl PublicParameters {
         let (set_name, set_value) = (name.clone(), value.clone());
         let reply = Reply::new(move |result: Result<(), String>| {
             if result.is_ok() {
-                self.keep(&set_name, &set_value);
+                // it was checked before the node was asked
+                let _ = locked(&self.values).set_live(&set_name, &set_value);
+                (self.announce)(&set_name, &set_value);
             }
             results.push(result);
             self.set_next(wanted, results, answer);
@@ -120,13 +122,6 @@ impl PublicParameters {
             Some(reason) => answer(vec![Err(reason)]),
             None => self.set(wanted, Box::new(answer)),
         }
-    }
-
-    /// Keeps what the node took, and announces it.
-    fn keep(&self, name: &str, value: &ParameterValue) {
-        // it was checked before the node was asked
-        let _ = locked(&self.values).set_live(name, value);
-        (self.announce)(name, value);
     }
 }
 

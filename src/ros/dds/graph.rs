@@ -116,7 +116,11 @@ impl DdsGraph {
                     tracing::info!(service, "{what}");
                 }
             }
-            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => self.lost(guid),
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+                self.reported.remove(&guid);
+                self.callers.remove(&guid);
+                self.unmatch(|other| *other == guid);
+            }
             Event::RemoteReaderQosIncompatible { local_writer, requested_qos, offered_qos, remote_reader } => {
                 self.misfit(local_writer, remote_reader, &requested_qos, &offered_qos, "a listener");
             }
@@ -125,12 +129,6 @@ impl DdsGraph {
             }
             _ => {}
         }
-    }
-
-    fn lost(&mut self, guid: GUID) {
-        self.reported.remove(&guid);
-        self.callers.remove(&guid);
-        self.unmatch(|other| *other == guid);
     }
 
     fn unmatch(&mut self, is_gone: impl Fn(&GUID) -> bool) {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TrySendError};
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use nalgebra::Point3;
@@ -70,7 +70,7 @@ impl RefinementWorker {
     }
 
     fn ask_features(&self, input: FeatureInput) {
-        if let Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) = self.features.try_send(input) {
+        if self.features.try_send(input).is_err() {
             warn!("a call about features found no room: its caller gets no answer");
         }
     }

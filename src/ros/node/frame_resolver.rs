@@ -72,7 +72,7 @@ pub struct FrameResolver {
     names: FrameNames,
     placement: Placement,
     /// the axes of the wrenches, once one has come
-    axes: Option<WrenchFrame>,
+    pub axes: Option<WrenchFrame>,
     /// all transforms so far
     pub frames: FrameBuffer,
 }
@@ -86,16 +86,6 @@ impl FrameResolver {
     /// Frame of the poses in the recording.
     pub fn recorded_frame(&self) -> &'static str {
         if self.placement.pose_wo.is_some() { CELL } else { OBJECT }
-    }
-
-    /// The axes of the wrenches, once one has come.
-    pub fn axes(&self) -> Option<WrenchFrame> {
-        self.axes
-    }
-
-    /// A new session: wrenches may come in other axes.
-    pub fn forget_axes(&mut self) {
-        self.axes = None;
     }
 
     /// A message of the recording, as the refiner takes it.
@@ -267,12 +257,12 @@ mod tests {
         assert_eq!(force(of_sensor.wrench(&wrench("stylus")).unwrap()), Vector3::x());
         assert_eq!(force(of_sensor.wrench(&wrench("stylus_sensor")).unwrap()), Vector3::x());
         assert!((force(of_sensor.wrench(&wrench("gauge")).unwrap()) - Vector3::y()).norm() < 1e-12);
-        assert_eq!(of_sensor.axes(), Some(WrenchFrame::Sensor));
+        assert_eq!(of_sensor.axes, Some(WrenchFrame::Sensor));
         assert_eq!(of_sensor.wrench(&wrench("object")).unwrap_err(), Refusal::AxesChanged);
         let mut of_object = resolver(None);
         assert!((force(of_object.wrench(&wrench("base")).unwrap()) - Vector3::y()).norm() < 1e-12);
         assert_eq!(force(of_object.wrench(&wrench("object")).unwrap()), Vector3::x());
-        assert_eq!(of_object.axes(), Some(WrenchFrame::Object));
+        assert_eq!(of_object.axes, Some(WrenchFrame::Object));
         assert_eq!(of_object.wrench(&wrench("elsewhere")).unwrap_err().name(), "unknown_frame");
     }
 }

@@ -188,19 +188,18 @@ impl RefinementWorker {
             self.session.counters.paused += 1;
             return;
         }
-        if self.waiting[stream].is_empty() {
-            if let Some(message) = self.place(message, at) {
-                self.waiting[stream].push_back((message, at));
+        match self.waiting[stream].len() {
+            0 => {
+                let left = self.place(message, at);
+                self.waiting[stream].extend(left.map(|message| (message, at)));
             }
-            return;
+            MOST_WAITING.. => self.session.counters.refuse("transform"),
+            // behind those that wait already, so that the order stays
+            _ => {
+                self.waiting[stream].push_back((message, at));
+                self.retry_waiting();
+            }
         }
-        // behind those that wait already, so that the order stays
-        if self.waiting[stream].len() >= MOST_WAITING {
-            self.session.counters.refuse("transform");
-            return;
-        }
-        self.waiting[stream].push_back((message, at));
-        self.retry_waiting();
     }
 
     /// Tries again what waits for a transform; gives up what has waited for too long.
@@ -244,8 +243,12 @@ impl RefinementWorker {
 
     /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
     fn pair(&mut self, message: Message, stream: usize, at: Instant) {
-        if self.resolver.axes() == Some(WrenchFrame::Object) && self.session.axes == WrenchFrame::Sensor {
-            self.turn_to_object_axes();
+        // the first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew
+        if self.resolver.axes == Some(WrenchFrame::Object)
+            && self.session.axes == WrenchFrame::Sensor
+            && let Err(error) = self.session.turn_axes(&self.setup, WrenchFrame::Object)
+        {
+            self.fault = Some(error.to_string());
         }
         let message = shifted(message, self.session.epoch.shift_ns);
         let is_taken = message.stamp_ns() >= 0 && self.session.sync.push(self.resolver.placed(message));
@@ -262,13 +265,6 @@ impl RefinementWorker {
         }
         while let Some(sample) = self.session.sync.next_sample() {
             self.sample(&sample, Some(at));
-        }
-    }
-
-    /// The first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew.
-    fn turn_to_object_axes(&mut self) {
-        if let Err(error) = self.session.turn_axes(&self.setup, WrenchFrame::Object) {
-            self.fault = Some(error.to_string());
         }
     }
 
@@ -340,8 +336,8 @@ impl RefinementWorker {
 
     /// Goes over to another session; the one before.
     pub(super) fn change_session(&mut self, next: NodeSession) -> NodeSession {
-        self.resolver.forget_axes();
-        (self.waiting, self.mismatch_ns) = (Default::default(), i64::MIN);
+        // its wrenches may come in other axes
+        (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
         // a change of the session before means nothing in this one
         self.kept = self.unsent.take().or(self.kept.take());
         std::mem::replace(&mut self.session, next)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::Duration;
 
 use super::channels::{LastTip, NextTouches, ViewInput};
@@ -87,10 +87,8 @@ impl View {
                 self.patches.note(&edits);
                 edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
                 edits.faces.iter().for_each(|(face, _)| self.tiles.forget_mismatch(*face));
-                match self.spare.try_send(edits) {
-                    // as many come back as went out
-                    Ok(()) | Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {}
-                }
+                // as many come back as went out
+                let _ = self.spare.try_send(edits);
             }
             ViewInput::Session(replica) => {
                 self.tiles.restart(&replica);
@@ -142,12 +140,8 @@ impl View {
             self.whole = Some(Box::new(self.patches.whole(Arc::clone(&replica), frame.to_owned())));
         }
         if let Some(whole) = &mut self.whole {
-            let mut sent = 0;
-            for part in whole.by_ref().take(PARTS_AT_ONCE) {
-                self.port.publish(Publication::MeshPatch(part));
-                sent += 1;
-            }
-            if sent < PARTS_AT_ONCE {
+            let parts = whole.by_ref().take(PARTS_AT_ONCE);
+            if parts.map(|part| self.port.publish(Publication::MeshPatch(part))).count() < PARTS_AT_ONCE {
                 self.whole = None;
             }
         }
