@@ -96,11 +96,10 @@ impl RefinementWorker {
         arm: Option<ArmHandle>,
     ) -> Self {
         let now = setup.clock.now();
-        let mismatch_rate_hz = setup.shared.parameters().double("mismatch_rate_hz");
-        let side_work = SideWork::on(setup.clock.clone());
-        let resolver = FrameResolver::new(setup.frame_names(), setup.scene.placement());
         Self {
-            resolver,
+            mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
+            side_work: SideWork::on(setup.clock.clone()),
+            resolver: FrameResolver::new(setup.frame_names(), setup.scene.placement()),
             setup,
             port,
             view,
@@ -117,12 +116,10 @@ impl RefinementWorker {
             lost_transform: None,
             last_state: String::new(),
             endpoints: BTreeMap::new(),
-            side_work,
             sampled: now,
             edits_sent: now,
             tip_published: now,
             mismatch_ns: i64::MIN,
-            mismatch_rate_hz,
             diagnosed: now,
         }
     }
