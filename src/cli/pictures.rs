@@ -49,7 +49,7 @@ pub(super) fn write_coloured(
     mesh: &TriMesh,
     unit: MeshUnit,
     colours: &[Rgb],
-    further: impl IntoIterator<Item = VertexColumn<'static>>,
+    further: impl IntoIterator<Item = VertexColumn>,
 ) -> Result<(), CliError> {
     let channel = |at: usize| colours.iter().map(|colour| colour[at]).collect::<Vec<u8>>().into();
     let named = ["red", "green", "blue"].into_iter().enumerate();

@@ -1,11 +1,11 @@
 //! Where a person with a stylus should touch next: by the same reckoning that sends an arm.
 
-use std::f64::consts::{PI, TAU};
-
 use nalgebra::{Point3, Vector3};
 
 use super::cylinder_fit::SQUARE;
 use super::design::{Asked, Candidate, Knowledge};
+use super::search_context::toward;
+use super::slot::around_stadium;
 use crate::features::fit::{Freedom, Surface};
 use crate::features::{Feature, Kind, Walls};
 use crate::stylus::ProbedPoint;
@@ -35,33 +35,24 @@ const ENOUGH: f64 = 10e-6;
 /// - `touches`: all touches; the feature names its own by their numbers.
 pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {
     let axis = feature.axis.as_ref()?.value;
+    let place = Asked::default().each(&[Freedom::X, Freedom::Y], ENOUGH);
     match feature.walls.as_ref()? {
         Walls::Round(wall) => {
-            let square = Asked::default().and(&[(Freedom::X, 1.0)], ENOUGH).and(&[(Freedom::Y, 1.0)], ENOUGH);
-            let asked = square.and(&[(Freedom::Size, 2.0)], 2.0 * ENOUGH);
-            let ring = (0..AROUND).map(|at| {
-                let angle = at as f64 / AROUND as f64 * TAU;
-                Vector3::new(angle.cos(), angle.sin(), 0.0)
-            });
+            let asked = place.and(&[(Freedom::Size, 2.0)], 2.0 * ENOUGH);
+            let ring = (0..AROUND).map(|at| toward(at as f64 / AROUND as f64));
             let places = ring.map(|out| (out * wall.radius, out)).collect();
             best(feature, touches, wall, &axis, places, wall.radius, &asked)
         }
         Walls::Slot(walls) => {
-            let place = Asked::default().and(&[(Freedom::X, 1.0)], ENOUGH).and(&[(Freedom::Y, 1.0)], ENOUGH);
-            let turned = place.and(&[(Freedom::Turn, 1.0)], 2.0 * ENOUGH / walls.length);
-            let asked = turned.and(&[(Freedom::Second, 1.0)], ENOUGH).and(&[(Freedom::Size, 1.0)], ENOUGH);
+            let turned = place.each(&[Freedom::Turn], 2.0 * ENOUGH / walls.length);
+            let asked = turned.each(&[Freedom::Second, Freedom::Size], ENOUGH);
             let (radius, half) = (walls.width / 2.0, (walls.length - walls.width).max(0.0) / 2.0);
-            let spread = |at: usize| at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0;
-            let out = |middle: f64, angle: f64| {
+            let out = |(middle, angle): (f64, f64)| {
                 let out = Vector3::new(angle.cos(), angle.sin(), 0.0);
                 (Vector3::new(middle, 0.0, 0.0) + out * radius, out)
             };
-            let sides = (0..ALONG).flat_map(|at| [-PI, PI].map(|turn| out(spread(at) * half, turn / 2.0)));
-            let ends = (0..ALONG).flat_map(|at| {
-                let angle = spread(at) * PI / 3.0;
-                [out(half, angle), out(-half, PI - angle)]
-            });
-            best(feature, touches, walls, &axis, sides.chain(ends).collect(), radius, &asked)
+            let places = around_stadium(half, ALONG).map(out).collect();
+            best(feature, touches, walls, &axis, places, radius, &asked)
         }
     }
 }
@@ -116,6 +107,8 @@ fn best<M: Surface>(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{PI, TAU};
+
     use super::*;
     use crate::features::fit::Cylinder;
 

@@ -1,27 +1,17 @@
 //! A boss from one flag: its top, where the ground begins beside it in three directions, then its wall from outside.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{Point3, Vector3};
 
-use super::cylinder_fit::{BELOW_RIM, RoundWall, surface_about};
+use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::pattern::{Next, Stage, Touched};
-use super::search::{ROUGH, SHALLOW};
-use super::search_context::{SearchContext, TouchResult};
-use super::slide::{RimStation, Slide, circle};
+use super::pattern::{Stage, Touched};
+use super::search::{AROUND, BELOW_RIM, ROUGH};
+use super::search_context::{RING, SearchContext, TouchPlan, TouchResult, toward};
+use super::slide::Slide;
+use crate::features::Feature;
 use crate::features::fit::Observation;
-use crate::features::{End, Feature};
 
-/// Places around the flag where the top is searched, beside the flag itself.
-const RING: usize = 6;
-/// First directions.
-const FIRST: usize = 3;
-/// More directions that are tried after a miss in the first one.
-const MOST_FIRST: usize = 6;
-/// Touches of the ground around the foot.
-const AROUND: usize = 4;
 /// The distance of the search outward grows by this factor.
 const FARTHER: f64 = 1.4;
 /// No boss is larger, m.
@@ -39,8 +29,9 @@ const HALF: f64 = 0.5;
 /// Heights within this are of one surface, m.
 const FLAT: f64 = 0.3e-3;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum BossPhase {
+    #[default]
     Top,
     /// out of the top, to a distance from the middle that is tried, m
     Out(f64),
@@ -50,7 +41,7 @@ enum BossPhase {
     Wall,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct BossPattern {
     phase: BossPhase,
     /// from above
@@ -65,34 +56,14 @@ pub(super) struct BossPattern {
 
 impl BossPattern {
     pub fn new() -> Self {
-        Self {
-            phase: BossPhase::Top,
-            seen: Vec::new(),
-            wall: RoundWall { is_boss: true, ..RoundWall::default() },
-            ground: Vec::new(),
-            ground_z: f64::NEG_INFINITY,
-            direction: 0,
-            around: 0,
-        }
+        let wall = RoundWall { is_boss: true, ..RoundWall::default() };
+        Self { wall, ground_z: f64::NEG_INFINITY, ..Self::default() }
     }
 
-    fn outward(&self) -> Vector3<f64> {
-        // a second round goes between the first
-        let turn = self.direction as f64 + 0.5 * (self.direction / FIRST) as f64;
-        let angle = turn / FIRST as f64 * TAU;
-        Vector3::new(angle.cos(), angle.sin(), 0.0)
-    }
-
-    /// How far below the top the wall is touched: between the edge of the top and the ground, m.
-    fn depth(&self, context: &SearchContext) -> Option<f64> {
-        let ball = context.params.ball_radius;
-        let deepest = context.height - self.ground_z - ball - OFF_GROUND;
-        (deepest > 0.2 * ball).then(|| deepest.min(SHALLOW * ball))
-    }
-
-    fn too_low(&self, context: &SearchContext) -> ExploreError {
-        let height_mm = (context.height - self.ground_z) * 1e3;
-        ExploreError::TooLow { kind: "boss", height_mm, ball_mm: context.params.ball_radius * 2e3 }
+    /// How far below the top the wall is touched: between the edge of the top and the ground, m; at the highest and the deepest.
+    fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
+        let deep = context.above_ground("boss", self.ground_z, OFF_GROUND)?;
+        Ok([(BELOW_RIM * context.params.ball_radius).min(HIGH * deep), deep])
     }
 
     fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -150,47 +121,29 @@ impl BossPattern {
 }
 
 impl Stage for BossPattern {
-    fn next(&mut self, context: &SearchContext) -> Next {
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
-        match self.phase {
-            BossPhase::Top => {
-                let angle = self.around as f64 / RING as f64 * TAU;
-                let far = if self.around == 0 { 0.0 } else { context.params.flag_radius };
-                let place = Point3::new(far * angle.cos(), far * angle.sin(), 0.0);
-                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
-            }
+        let (middle, outward) = (self.wall.middle, RoundWall::first_direction(self.direction));
+        Ok(Some(match self.phase {
+            BossPhase::Top => context.ring(self.around, context.params.flag_radius, clearance + GROUND * ball + ROUGH),
             BossPhase::Out(distance) if distance > LARGEST || self.direction >= MOST_FIRST => {
-                Next::Failed(ExploreError::NoWall {
-                    kind: "boss",
-                    walls: self.wall.measuring.observations.len(),
-                    asked: self.direction + 1,
-                    reach_mm: LARGEST * 1e3,
-                })
+                return Err(self.wall.missing(self.direction + 1, LARGEST));
             }
-            BossPhase::Out(distance) => {
-                let place = self.wall.middle + self.outward() * distance;
-                Next::Touch(context.down(&place, clearance + GROUND * ball))
+            BossPhase::Out(distance) => context.down(&(middle + outward * distance), clearance + GROUND * ball),
+            BossPhase::In(distance) => {
+                let [_, depth] = self.depths(context)?;
+                context.sideways(&(middle + outward * distance), depth, &-outward, distance)
             }
-            BossPhase::In(distance) => match self.depth(context) {
-                None => Next::Failed(self.too_low(context)),
-                Some(depth) => {
-                    let place = self.wall.middle + self.outward() * distance;
-                    Next::Touch(context.sideways(&place, depth, &-self.outward(), distance))
-                }
-            },
             BossPhase::Ground => {
-                let angle = (self.around as f64 + 0.5) / AROUND as f64 * TAU;
                 let away = self.wall.radius(context) + 2.0 * BESIDE * ball;
-                let place = self.wall.middle + Vector3::new(angle.cos(), angle.sin(), 0.0) * away;
-                Next::Touch(context.down(&place, clearance + GROUND * ball))
+                let place = middle + toward((self.around as f64 + 0.5) / AROUND as f64) * away;
+                context.down(&place, clearance + GROUND * ball)
             }
-            BossPhase::Wall if self.wall.is_known(context) => Next::Done { is_as_asked: true },
             BossPhase::Wall => {
-                let Some(deep) = self.depth(context) else { return Next::Failed(self.too_low(context)) };
-                let planned = self.wall.best(context, [(BELOW_RIM * ball).min(HIGH * deep), deep]);
-                planned.map_or(Next::Done { is_as_asked: false }, Next::Touch)
+                let depths = self.depths(context)?;
+                return Ok(self.wall.next(context, depths));
             }
-        }
+        }))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -207,10 +160,7 @@ impl Stage for BossPattern {
                     self.phase = BossPhase::Wall;
                 }
             }
-            BossPhase::Wall => {
-                self.wall.measuring.take(touch);
-                self.wall.recentre(context);
-            }
+            BossPhase::Wall => self.wall.take(context, touch),
         }
     }
 
@@ -222,7 +172,7 @@ impl Stage for BossPattern {
         let wall = self.wall.fitted(context, &foot)?;
         let height = |o: &Observation| context.in_f(&o.point).z;
         let highest = self.seen.iter().max_by(|a, b| height(a).total_cmp(&height(b)));
-        let top = highest.map(|o| End { point: o.point - context.out() * o.offset, sigma: o.sigma });
+        let top = highest.map(|contact| context.end(contact));
         let touches = numbers([&self.wall.measuring.observations, &self.ground]);
         Ok(Some(Feature::round(&wall, &foot, top.as_ref(), touches)))
     }
@@ -232,17 +182,8 @@ impl Stage for BossPattern {
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let (ball, radius) = (context.params.ball_radius, self.wall.radius(context));
-        let Some(deep) = self.depth(context) else { return Vec::new() };
-        let middle = Point3::new(self.wall.middle.x, self.wall.middle.y, context.height);
-        let rim = RimStation {
-            at: &circle(middle, radius, 1.0),
-            length: TAU * radius,
-            is_closed: true,
-            back: ball.min(HALF * radius),
-            depths: [(BELOW_RIM * ball).min(HIGH * deep), deep],
-            room: context.params.clearance,
-        };
-        rim.slides(context)
+        let Ok(depths) = self.depths(context) else { return Vec::new() };
+        let back = context.params.ball_radius.min(HALF * self.wall.radius(context));
+        self.wall.slides(context, back, depths, context.params.clearance)
     }
 }

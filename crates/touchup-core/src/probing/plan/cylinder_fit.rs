@@ -5,8 +5,11 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::design::{Asked, Knowledge};
-use super::measuring::{Measuring, Possible};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan};
+use super::error::ExploreError;
+use super::measuring::{Measuring, Possible, Wanted};
+use super::pattern::Touched;
+use super::search_context::{Quantity, SearchContext, TouchPlan, toward};
+use super::slide::{RimStation, Slide, circle};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
 use crate::numeric::{NormalEquations, mean};
 
@@ -14,11 +17,12 @@ use crate::numeric::{NormalEquations, mean};
 const DIRECTIONS: usize = 24;
 /// A hole is perpendicular to its surface within this, rad.
 pub(super) const SQUARE: f64 = 0.02;
-/// The ball's centre is this far below the surface where the wall is touched highest, over its radius: below a rim that is broken
-/// by no more, and as near to the opening as it may be, as the numbers refer to that place.
-pub(super) const BELOW_RIM: f64 = 0.7;
 /// So many touches before it is believed.
-pub(super) const LEAST_WALL: usize = 8;
+const LEAST_WALL: usize = 8;
+/// First directions.
+pub(super) const FIRST: usize = 3;
+/// More directions that are tried after a miss in the first one.
+pub(super) const MOST_FIRST: usize = 6;
 
 /// A round wall that is being touched.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +34,24 @@ pub(super) struct RoundWall {
 }
 
 impl RoundWall {
+    /// One of the first directions.
+    pub fn first_direction(at: usize) -> Vector3<f64> {
+        // a second round goes between the first
+        toward((at as f64 + 0.5 * (at / FIRST) as f64) / FIRST as f64)
+    }
+
+    /// Why there is none after these directions.
+    pub fn missing(&self, asked: usize, reach: f64) -> ExploreError {
+        let kind = if self.is_boss { "boss" } else { "hole" };
+        ExploreError::NoWall { kind, walls: self.measuring.observations.len(), asked, reach_mm: reach * 1e3 }
+    }
+
+    /// Takes a touch of the wall.
+    pub fn take(&mut self, context: &SearchContext, touch: &Touched) {
+        self.measuring.take(touch);
+        self.recentre(context);
+    }
+
     /// The middle of the circle through the contacts.
     pub fn recentre(&mut self, context: &SearchContext) {
         if let Some((centre, _)) = self.circle(context) {
@@ -55,83 +77,75 @@ impl RoundWall {
         Cylinder { pose_of, radius: self.radius(context), concave: !self.is_boss }
     }
 
-    fn asked(params: &PatternParams) -> Asked {
+    fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
+        let sigma = context.params.sigma;
         let asked = Asked::default();
-        let place =
-            |asked: Asked| asked.and(&[(Freedom::X, 1.0)], params.sigma).and(&[(Freedom::Y, 1.0)], params.sigma);
-        let size = |asked: Asked| asked.and(&[(Freedom::Size, 2.0)], params.sigma);
-        match params.quantity {
-            Quantity::Position => place(asked),
-            Quantity::Axis => {
-                asked.and(&[(Freedom::TiltX, 1.0)], params.sigma).and(&[(Freedom::TiltY, 1.0)], params.sigma)
+        let asked = match context.params.quantity {
+            Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
+            Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
+            Quantity::Diameter => asked.and(&[(Freedom::Size, 2.0)], sigma),
+            Quantity::All | Quantity::Length | Quantity::Width => {
+                asked.each(&[Freedom::X, Freedom::Y], sigma).and(&[(Freedom::Size, 2.0)], sigma)
             }
-            Quantity::Diameter => size(asked),
-            Quantity::All | Quantity::Length | Quantity::Width => size(place(asked)),
+        };
+        Wanted {
+            before: Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), SQUARE),
+            asked: asked.and_the_rest::<Cylinder>(sigma, guess.radius),
+            fit: square(),
+            least: LEAST_WALL,
         }
-    }
-
-    fn before(context: &SearchContext, guess: &Cylinder) -> Knowledge {
-        Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), SQUARE)
     }
 
     /// Standard uncertainty of the requested number, m or rad.
     pub fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let guess = self.guess(context);
-        let params = FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() };
-        let asked = Self::asked(&context.params);
-        let share = || {
-            self.measuring.uncertainty_ratio(
-                &guess,
-                &params,
-                Self::before(context, &guess),
-                &asked,
-                context.params.touch_sigma,
-            )
-        };
-        let has_enough = self.measuring.observations.len() >= LEAST_WALL;
-        has_enough.then(share).flatten().map(|share| share * context.params.sigma)
-    }
-
-    /// Whether it has the requested uncertainty.
-    pub fn is_known(&self, context: &SearchContext) -> bool {
-        self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+        self.measuring.uncertainty(&guess, &self.wanted(context, &guess), &context.params)
     }
 
     /// The touch of the wall with the largest gain.
     ///
     /// - `depths`: below the surface, m.
-    pub fn best(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
+    pub fn next(&mut self, context: &SearchContext, depths: [f64; 2]) -> Option<TouchPlan> {
         let surface = self.guess(context);
         let ball = context.params.ball_radius;
         // in a hole from the middle, of a boss from beside it
         let from = if self.is_boss { surface.radius + ball + context.params.clearance } else { 0.0 };
         let travel = if self.is_boss { context.params.clearance } else { surface.radius - ball };
-        let possible = (0..DIRECTIONS).flat_map(|at| depths.map(|depth| (at as f64 / DIRECTIONS as f64 * TAU, depth)));
-        let possible = possible.map(|(angle, depth)| {
-            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let planned =
-                context.sideways(&(self.middle + direction * from), depth, &self.towards(direction), travel + REACH);
+        let possible = (0..DIRECTIONS).flat_map(|at| depths.map(|depth| (at as f64 / DIRECTIONS as f64, depth)));
+        let (middle, is_boss) = (self.middle, self.is_boss);
+        let possible = possible.map(|(turned, depth)| {
+            let direction = toward(turned);
+            let into = if is_boss { -direction } else { direction };
+            let planned = context.sideways(&(middle + direction * from), depth, &into, travel + REACH);
             let point = surface.pose_of * (Point3::origin() + direction * surface.radius - Vector3::z() * depth);
             Possible { point, travel, planned }
         });
-        let possible = possible.collect();
-        let known = self.measuring.known(&surface, Self::before(context, &surface), context.params.touch_sigma);
-        let asked = Self::asked(&context.params).and_the_rest::<Cylinder>(context.params.sigma, surface.radius);
-        let (best, _) = self.measuring.best(&surface, &known, possible, &asked, context.params.touch_sigma)?;
-        Some(self.measuring.aim(&best))
-    }
-
-    /// Into the wall, at a direction from the middle.
-    pub fn towards(&self, direction: Vector3<f64>) -> Vector3<f64> {
-        if self.is_boss { -direction } else { direction }
+        let wanted = self.wanted(context, &surface);
+        self.measuring.next(&surface, &wanted, possible, &context.params)
     }
 
     /// The cylinder through the contacts of the wall, perpendicular to a surface.
     pub fn fitted(&self, context: &SearchContext, top: &Fit<Plane>) -> Result<Fit<Cylinder>, FitError> {
         let middle = self.guess(context).pose_of.translation.vector.into();
         let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
-        fit(&guess, &self.measuring.observations, &FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() })
+        fit(&guess, &self.measuring.observations, &square())
     }
+
+    /// Paths along the wall and across its rim.
+    ///
+    /// - `back`: how far the surface above the rim is known, m; `depths`: below it, m; `room`: beside the ball at the wall, m.
+    pub fn slides(&self, context: &SearchContext, back: f64, depths: [f64; 2], room: f64) -> Vec<Slide> {
+        let radius = self.radius(context);
+        let middle = Point3::new(self.middle.x, self.middle.y, context.height);
+        let side = if self.is_boss { 1.0 } else { -1.0 };
+        let at = &circle(middle, radius, side);
+        RimStation { at, length: TAU * radius, is_closed: true, back, depths, room }.slides(context)
+    }
+}
+
+/// Of walls that are perpendicular to their surface.
+pub(super) fn square() -> FitParams {
+    FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() }
 }
 
 /// A wall is searched so much farther than expected, m.

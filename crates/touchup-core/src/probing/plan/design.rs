@@ -40,6 +40,11 @@ impl Asked {
         self
     }
 
+    /// Several more, each of one freedom.
+    pub(super) fn each(self, freedoms: &[Freedom], sigma: f64) -> Self {
+        freedoms.iter().fold(self, |asked, freedom| asked.and(&[(*freedom, 1.0)], sigma))
+    }
+
     /// Whether a fit fixes all requested numbers.
     pub(super) fn is_fixed_by<M: Surface>(&self, fit: &Fit<M>) -> bool {
         self.by.iter().all(|by| fit.std_of(by).is_some())

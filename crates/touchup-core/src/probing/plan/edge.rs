@@ -1,24 +1,19 @@
 //! An edge from one flag: which side of it the ground is on, then both faces beside it, in turn across the edge.
 
-use std::f64::consts::TAU;
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-
-use super::cylinder_fit::BELOW_RIM;
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::measuring::{Measuring, Possible};
-use super::pattern::{Next, Stage, Touched};
-use super::search::{ROUGH, SHALLOW};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
+use super::measuring::{Measuring, Possible, Wanted};
+use super::pattern::{Stage, Touched};
+use super::search::{BELOW_RIM, ROUGH};
+use super::search_context::{PatternParams, Quantity, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
 use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, fit};
 use crate::numeric::mean;
 
-/// Places around the flag that are sorted into high and low, beside the flag itself.
-const RING: usize = 6;
 /// Lower by this, over the ball's radius, is beyond the edge.
 const BEYOND: f64 = 0.8;
 /// Places on the high side, back from the flag and along the edge, over the radius of the ring.
@@ -50,8 +45,10 @@ const LEAN: f64 = 0.1;
 /// So many touches of each face before it is believed.
 const LEAST: usize = 4;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum EdgePhase {
+    /// places around the flag are sorted into high and low
+    #[default]
     Ring,
     Top,
     /// the surface is the same all around
@@ -60,7 +57,7 @@ enum EdgePhase {
     Both,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct EdgePattern {
     phase: EdgePhase,
     tried: usize,
@@ -77,16 +74,7 @@ pub(super) struct EdgePattern {
 
 impl EdgePattern {
     pub fn new() -> Self {
-        Self {
-            phase: EdgePhase::Ring,
-            tried: 0,
-            seen: Vec::new(),
-            top: Measuring::default(),
-            side: Measuring::default(),
-            over: Vector3::x(),
-            ground_z: f64::NEG_INFINITY,
-            is_top_next: true,
-        }
+        Self { over: Vector3::x(), ground_z: f64::NEG_INFINITY, is_top_next: true, ..Self::default() }
     }
 
     fn along(&self) -> Vector3<f64> {
@@ -162,16 +150,7 @@ impl EdgePattern {
 
     /// How far below the top the side is touched, m.
     fn depth(&self, context: &SearchContext) -> Result<f64, ExploreError> {
-        let ball = context.params.ball_radius;
-        let deepest = context.height - self.ground_z - ball - OFF_GROUND;
-        match deepest > 0.2 * ball {
-            true => Ok(deepest.min(SHALLOW * ball)),
-            false => Err(ExploreError::TooLow {
-                kind: "edge",
-                height_mm: (context.height - self.ground_z) * 1e3,
-                ball_mm: ball * 2e3,
-            }),
-        }
+        context.above_ground("edge", self.ground_z, OFF_GROUND)
     }
 
     /// Inward from beyond the edge, at a place along it.
@@ -195,49 +174,28 @@ impl EdgePattern {
         let slope = if sxx > 0.0 { sxy / sxx } else { 0.0 };
         let out = (self.over - self.along() * slope).normalize();
         let x = out.cross(&Vector3::z());
-        let turn = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x, out.cross(&x), out]));
         let origin = mean - out * context.params.ball_radius;
         let origin = Vector3::new(origin.x, origin.y, context.height);
-        let in_f = Isometry3::from_parts(origin.into(), UnitQuaternion::from_rotation_matrix(&turn));
-        Plane { pose_of: context.pose_of * in_f }
+        plane(context, origin, [x, out.cross(&x), out])
     }
 
     fn top_plane(&self, context: &SearchContext) -> Plane {
         // over the edge is x, so that its leans are along and across the edge
-        let y = self.along();
-        let turn = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[self.over, y, Vector3::z()]));
         let at = context.in_f(&self.side_plane(context).point());
-        let in_f = Isometry3::from_parts(at.coords.into(), UnitQuaternion::from_rotation_matrix(&turn));
-        Plane { pose_of: context.pose_of * in_f }
+        plane(context, at.coords, [self.over, self.along(), Vector3::z()])
     }
 
-    /// The requested numbers of the top, whose y runs along the edge, and of the side, whose x does.
-    fn asked(params: &PatternParams, lean: Freedom) -> Asked {
+    /// What is wanted of the top, whose y runs along the edge, or of the side, whose x does.
+    fn wanted(params: &PatternParams, lean: Freedom) -> Wanted {
         let asked = Asked::default();
-        match params.quantity {
-            Quantity::Axis => asked.and(&[(lean, 1.0)], params.sigma),
-            Quantity::Position => asked.and(&[(Freedom::Z, 1.0)], params.sigma),
+        let asked = match params.quantity {
+            Quantity::Axis => asked.each(&[lean], params.sigma),
+            Quantity::Position => asked.each(&[Freedom::Z], params.sigma),
             // as far as it was touched
-            _ => asked
-                .and(&[(Freedom::Z, 1.0)], params.sigma)
-                .and(&[(lean, 1.0)], params.sigma / (REACH * params.flag_radius)),
-        }
-    }
-
-    fn before(params: &PatternParams) -> Knowledge {
-        Knowledge::before::<Plane>(params.flag_radius, LEAN)
-    }
-
-    fn known(&self, context: &SearchContext) -> [(Plane, Knowledge, Asked); 2] {
-        let before = || Self::before(&context.params);
-        let sigma = context.params.touch_sigma;
-        let (top, side) = (self.top_plane(context), self.side_plane(context));
-        let known = [self.top.known(&top, before(), sigma), self.side.known(&side, before(), sigma)];
-        let [of_top, of_side] = known;
-        [
-            (top, of_top, Self::asked(&context.params, Freedom::TiltY)),
-            (side, of_side, Self::asked(&context.params, Freedom::TiltX)),
-        ]
+            _ => asked.each(&[Freedom::Z], params.sigma).each(&[lean], params.sigma / (REACH * params.flag_radius)),
+        };
+        let before = Knowledge::before::<Plane>(params.flag_radius, LEAN);
+        Wanted { before, asked, fit: FitParams::default(), least: 0 }
     }
 
     fn places(params: &PatternParams) -> impl Iterator<Item = f64> + '_ {
@@ -265,26 +223,18 @@ impl EdgePattern {
         Self::places(&context.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))).collect()
     }
 
-    fn next_of_both(&mut self, context: &SearchContext) -> Next {
-        let deep = match self.depth(context) {
-            Ok(deep) => deep,
-            Err(error) => return Next::Failed(error),
-        };
-        let [top, side] = self.known(context);
-        let is_enough = self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
-        if is_enough && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
-            return Next::Done { is_as_asked: true };
-        }
-        let sigma = context.params.touch_sigma;
-        let of_top = self.top.best(&top.0, &top.1, self.possible_top(context, &top.0), &top.2, sigma);
-        let of_side = self.side.best(&side.0, &side.1, self.possible_side(context, &side.0, deep), &side.2, sigma);
+    /// Of the top or of the side, whichever gains more.
+    fn next_of_both(&mut self, context: &SearchContext, deep: f64) -> Option<TouchPlan> {
+        let params = &context.params;
+        let (top, side) = (self.top_plane(context), self.side_plane(context));
+        let of_top = Self::wanted(params, Freedom::TiltY);
+        let of_top = self.top.best(&top, &of_top, self.possible_top(context, &top), params);
+        let of_side = Self::wanted(params, Freedom::TiltX);
+        let of_side = self.side.best(&side, &of_side, self.possible_side(context, &side, deep), params);
         let gain = |best: &Option<(Possible, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
         self.is_top_next = gain(&of_top) >= gain(&of_side);
         let (chosen, measuring) = if self.is_top_next { (of_top, &mut self.top) } else { (of_side, &mut self.side) };
-        match chosen {
-            Some((possible, _)) => Next::Touch(measuring.aim(&possible)),
-            None => Next::Done { is_as_asked: false },
-        }
+        chosen.map(|(possible, _)| measuring.aim(&possible))
     }
 
     fn fitted(&self, context: &SearchContext) -> Result<[Fit<Plane>; 2], ExploreError> {
@@ -295,36 +245,30 @@ impl EdgePattern {
 }
 
 impl Stage for EdgePattern {
-    fn next(&mut self, context: &SearchContext) -> Next {
-        let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
-        match self.phase {
-            EdgePhase::NoEdge => Next::Failed(ExploreError::NoEdge { radius_mm: Self::ring(&context.params) * 1e3 }),
-            EdgePhase::Ring => {
-                let angle = self.tried as f64 / RING as f64 * TAU;
-                let far = if self.tried == 0 { 0.0 } else { Self::ring(&context.params) };
-                let place = Point3::new(far * angle.cos(), far * angle.sin(), 0.0);
-                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
-            }
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+        let PatternParams { ball_radius: ball, clearance, flag_radius, .. } = context.params;
+        let (ring, from_above) = (Self::ring(&context.params), clearance + GROUND * ball + ROUGH);
+        Ok(Some(match self.phase {
+            EdgePhase::NoEdge => return Err(ExploreError::NoEdge { radius_mm: ring * 1e3 }),
+            EdgePhase::Ring => context.ring(self.tried, ring, from_above),
             EdgePhase::Top => {
-                let [back, along] = MORE[self.tried].map(|share| share * Self::ring(&context.params));
-                let place = Point3::origin() - self.over * back + self.along() * along;
-                Next::Touch(context.down(&place, clearance + GROUND * ball + ROUGH))
+                let [back, along] = MORE[self.tried].map(|share| share * ring);
+                context.down(&(Point3::origin() - self.over * back + self.along() * along), from_above)
             }
-            EdgePhase::Side if self.tried >= MOST_FIRST => Next::Failed(ExploreError::NoWall {
-                kind: "edge",
-                walls: self.side.observations.len(),
-                asked: self.tried,
-                reach_mm: 2e3 * (Self::ring(&context.params) + ball),
-            }),
+            EdgePhase::Side if self.tried >= MOST_FIRST => {
+                let walls = self.side.observations.len();
+                let reach_mm = 2e3 * (ring + ball);
+                return Err(ExploreError::NoWall { kind: "edge", walls, asked: self.tried, reach_mm });
+            }
             EdgePhase::Side => {
-                let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * context.params.flag_radius;
-                match self.depth(context) {
-                    Ok(depth) => Next::Touch(self.inward(context, along, depth)),
-                    Err(error) => Next::Failed(error),
-                }
+                let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius;
+                self.inward(context, along, self.depth(context)?)
             }
-            EdgePhase::Both => self.next_of_both(context),
-        }
+            EdgePhase::Both => {
+                let deep = self.depth(context)?;
+                return Ok(self.next_of_both(context, deep));
+            }
+        }))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -365,15 +309,19 @@ impl Stage for EdgePattern {
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
-        let params = &context.params;
-        let share = |measuring: &Measuring, plane: &Plane, lean: Freedom| {
-            let asked = Self::asked(params, lean);
-            measuring.uncertainty_ratio(plane, &FitParams::default(), Self::before(params), &asked, params.touch_sigma)
+        if self.phase != EdgePhase::Both {
+            return None;
+        }
+        let known = |measuring: &Measuring, plane: &Plane, lean: Freedom| {
+            measuring.uncertainty(plane, &Self::wanted(&context.params, lean), &context.params)
         };
-        let is_both = self.phase == EdgePhase::Both;
-        let of_top = is_both.then(|| share(&self.top, &self.top_plane(context), Freedom::TiltY)).flatten()?;
-        let of_side = share(&self.side, &self.side_plane(context), Freedom::TiltX)?;
-        Some(of_top.max(of_side) * params.sigma)
+        let of_top = known(&self.top, &self.top_plane(context), Freedom::TiltY)?;
+        Some(of_top.max(known(&self.side, &self.side_plane(context), Freedom::TiltX)?))
+    }
+
+    fn is_known(&self, context: &SearchContext) -> bool {
+        let is_enough = self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
+        is_enough && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
@@ -392,4 +340,11 @@ impl Stage for EdgePattern {
         };
         rim.slides(context)
     }
+}
+
+/// The plane at a place of F with these axes.
+fn plane(context: &SearchContext, origin: Vector3<f64>, axes: [Vector3<f64>; 3]) -> Plane {
+    let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+    let in_f = Isometry3::from_parts(origin.into(), UnitQuaternion::from_rotation_matrix(&turn));
+    Plane { pose_of: context.pose_of * in_f }
 }

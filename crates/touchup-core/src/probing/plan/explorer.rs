@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::error::ExploreError;
-use super::pattern::{Next, Stage, Touched};
+use super::pattern::{Stage, Touched};
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use super::{boss, edge, hole, plane, region, slot};
@@ -87,10 +87,11 @@ impl Explorer {
         if self.ended.is_some() || self.context.touches >= self.context.params.budget {
             return None;
         }
-        match self.stage.next(&self.context) {
-            Next::Touch(planned) => self.asked = Some(planned),
-            Next::Done { is_as_asked } => self.ended = Some(Ok(is_as_asked)),
-            Next::Failed(error) => self.ended = Some(Err(error)),
+        let is_known = self.stage.is_known(&self.context);
+        match if is_known { Ok(None) } else { self.stage.next(&self.context) } {
+            Ok(Some(planned)) => self.asked = Some(planned),
+            Ok(None) => self.ended = Some(Ok(is_known)),
+            Err(error) => self.ended = Some(Err(error)),
         }
         self.asked
     }

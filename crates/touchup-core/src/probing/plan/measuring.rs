@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
 use super::pattern::Touched;
-use super::search_context::{Expected, TouchPlan, TouchResult};
+use super::search_context::{Expected, PatternParams, TouchPlan, TouchResult};
 use crate::features::fit::{FitParams, Observation, Surface, fit};
 
 /// A candidate touch: where the surface would be touched, and how.
@@ -14,6 +14,30 @@ pub(super) struct Possible {
     /// with the ball's centre so far from where the search begins, m
     pub travel: f64,
     pub planned: TouchPlan,
+}
+
+/// What is wanted of a surface, and what is believed of it before it is touched.
+pub(super) struct Wanted {
+    pub before: Knowledge,
+    pub asked: Asked,
+    pub fit: FitParams,
+    /// so many touches before it is believed
+    pub least: usize,
+}
+
+impl Wanted {
+    /// The covariance of a surface after touches of it.
+    fn known<'a, M: Surface>(
+        &self,
+        surface: &M,
+        touches: impl Iterator<Item = &'a Observation>,
+        params: &PatternParams,
+    ) -> Knowledge {
+        touches.fold(self.before.clone(), |known, o| {
+            // the ball's centre lies on the same normal as the place that it touches
+            known.with(surface, &Candidate { point: o.point, sigma: o.sigma.max(params.touch_sigma) })
+        })
+    }
 }
 
 /// Touches of one surface.
@@ -48,55 +72,54 @@ impl Measuring {
         }
     }
 
-    /// The covariance of a surface after the touches, from the one before them.
-    pub fn known<M: Surface>(&self, surface: &M, before: Knowledge, touch_sigma: f64) -> Knowledge {
-        self.observations.iter().fold(before, |known, o| {
-            // the ball's centre lies on the same normal as the place that it touches
-            known.with(surface, &Candidate { point: o.point, sigma: o.sigma.max(touch_sigma) })
-        })
-    }
-
-    /// The largest standard uncertainty of the requested numbers over the requested one of each, as far as the touches support it: of
-    /// those that lie on one surface, and stretched where they differ from it beyond what they say of themselves.
+    /// The largest standard uncertainty of the requested numbers, m or rad by the requested one of each, as far as the touches support it:
+    /// of those that lie on one surface, and stretched where they differ from it beyond what they say of themselves.
     ///
-    /// `None` where the touches do not fix a number, or where more than [`MOST_REFUSED`] of them lie elsewhere.
-    pub fn uncertainty_ratio<M: Surface>(
-        &self,
-        guess: &M,
-        params: &FitParams,
-        before: Knowledge,
-        asked: &Asked,
-        touch_sigma: f64,
-    ) -> Option<f64> {
-        let fit = fit(guess, &self.observations, params).ok()?;
-        let kept: Vec<_> =
-            self.observations.iter().zip(&fit.used).filter(|(_, used)| **used).map(|(o, _)| *o).collect();
-        let refused = (self.observations.len() - kept.len()) as f64;
-        if !asked.is_fixed_by(&fit) || refused > MOST_REFUSED * self.observations.len() as f64 {
+    /// `None` where there are too few, where they do not fix a number, or where more than [`MOST_REFUSED`] of them lie elsewhere.
+    pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted, params: &PatternParams) -> Option<f64> {
+        if self.observations.len() < wanted.least {
             return None;
         }
-        let known = Self { observations: kept, ..Self::default() }.known(guess, before, touch_sigma);
-        Some(known.worst(asked) * (fit.chi_squared / fit.degrees.max(1) as f64).sqrt().max(1.0))
+        let fit = fit(guess, &self.observations, &wanted.fit).ok()?;
+        let refused = fit.used.iter().filter(|used| !**used).count() as f64;
+        if !wanted.asked.is_fixed_by(&fit) || refused > MOST_REFUSED * self.observations.len() as f64 {
+            return None;
+        }
+        let kept = self.observations.iter().zip(&fit.used).filter(|(_, used)| **used).map(|(o, _)| o);
+        let share = wanted.known(guess, kept, params).worst(&wanted.asked);
+        Some(share * (fit.chi_squared / fit.degrees.max(1) as f64).sqrt().max(1.0) * params.sigma)
     }
 
     /// The touch with the largest gain for the requested numbers, and its gain.
     pub fn best<M: Surface>(
         &self,
         surface: &M,
-        known: &Knowledge,
-        possible: Vec<Possible>,
-        asked: &Asked,
-        touch_sigma: f64,
+        wanted: &Wanted,
+        possible: impl IntoIterator<Item = Possible>,
+        params: &PatternParams,
     ) -> Option<(Possible, f64)> {
+        let known = wanted.known(surface, self.observations.iter(), params);
         let is_alive = |p: &Possible| self.dead.iter().all(|dead| (dead - p.point).norm() > DEAD);
         let mut possible: Vec<Possible> = possible.into_iter().filter(is_alive).collect();
-        let candidates: Vec<_> = possible.iter().map(|p| Candidate { point: p.point, sigma: touch_sigma }).collect();
-        let best = known.best(surface, &candidates, asked)?;
-        let gain = known.gain(surface, &candidates[best], asked);
+        let candidate = |p: &Possible| Candidate { point: p.point, sigma: params.touch_sigma };
+        let candidates: Vec<_> = possible.iter().map(candidate).collect();
+        let best = known.best(surface, &candidates, &wanted.asked)?;
+        let gain = known.gain(surface, &candidates[best], &wanted.asked);
         let mut chosen = possible.swap_remove(best);
         let sigma = known.sigma_at(surface, &chosen.point);
         chosen.planned.expected = Some(Expected { travel: chosen.travel, sigma });
         Some((chosen, gain))
+    }
+
+    /// The planned touch with the largest gain.
+    pub fn next<M: Surface>(
+        &mut self,
+        surface: &M,
+        wanted: &Wanted,
+        possible: impl IntoIterator<Item = Possible>,
+        params: &PatternParams,
+    ) -> Option<TouchPlan> {
+        self.best(surface, wanted, possible, params).map(|(best, _)| self.aim(&best))
     }
 
     /// The planned touch is one of this surface.

@@ -10,16 +10,6 @@ use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::Observation;
 
-/// The next action of a stage.
-pub(super) enum Next {
-    Touch(TouchPlan),
-    /// all has the requested uncertainty, or no touch can improve it
-    Done {
-        is_as_asked: bool,
-    },
-    Failed(ExploreError),
-}
-
 /// A touch and its result, as a stage takes it.
 pub(super) struct Touched {
     pub planned: TouchPlan,
@@ -31,8 +21,11 @@ pub(super) struct Touched {
 
 /// One kind of feature, being explored.
 pub(super) trait Stage: Debug + Send {
-    /// The next planned touch.
-    fn next(&mut self, context: &SearchContext) -> Next;
+    /// The next planned touch; `None` when no touch can improve it.
+    ///
+    /// # Errors
+    /// [`ExploreError`] when there is no such feature.
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError>;
     /// Takes the result of the touch.
     fn take(&mut self, context: &mut SearchContext, touch: &Touched);
     /// The feature, as far as it is known.
@@ -42,6 +35,10 @@ pub(super) trait Stage: Debug + Send {
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError>;
     /// Standard uncertainty of the number now, m or rad.
     fn uncertainty(&self, context: &SearchContext) -> Option<f64>;
+    /// Whether it has the requested uncertainty.
+    fn is_known(&self, context: &SearchContext) -> bool {
+        self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+    }
     /// Paths to slide over it, once there is a feature.
     fn slides(&self, context: &SearchContext) -> Vec<Slide>;
 }

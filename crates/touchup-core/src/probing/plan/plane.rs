@@ -6,10 +6,10 @@ use super::cylinder_fit::surface_about;
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
-use super::measuring::{Measuring, Possible};
-use super::pattern::{Next, Stage, Touched};
+use super::measuring::{Measuring, Possible, Wanted};
+use super::pattern::{Stage, Touched};
 use super::search::{ROUGH, hexagonal};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchResult};
+use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::{FitParams, Freedom, Plane};
@@ -42,21 +42,17 @@ impl PlanePattern {
         Plane { pose_of: context.pose_of * nalgebra::Translation3::new(0.0, 0.0, context.height) }
     }
 
-    fn asked(params: &PatternParams) -> Asked {
+    fn wanted(params: &PatternParams) -> Wanted {
         let asked = Asked::default();
-        let lean =
-            |asked: Asked, sigma: f64| asked.and(&[(Freedom::TiltX, 1.0)], sigma).and(&[(Freedom::TiltY, 1.0)], sigma);
-        let place = |asked: Asked| asked.and(&[(Freedom::Z, 1.0)], params.sigma);
-        match params.quantity {
-            Quantity::Axis => lean(asked, params.sigma),
-            Quantity::Position => place(asked),
+        let leans = [Freedom::TiltX, Freedom::TiltY];
+        let asked = match params.quantity {
+            Quantity::Axis => asked.each(&leans, params.sigma),
+            Quantity::Position => asked.each(&[Freedom::Z], params.sigma),
             // at the rim of the field it is to be known as well as in its middle
-            _ => lean(place(asked), params.sigma / params.flag_radius),
-        }
-    }
-
-    fn before(context: &SearchContext) -> Knowledge {
-        Knowledge::before::<Plane>(context.params.flag_radius, LEAN)
+            _ => asked.each(&[Freedom::Z], params.sigma).each(&leans, params.sigma / params.flag_radius),
+        };
+        let before = Knowledge::before::<Plane>(params.flag_radius, LEAN);
+        Wanted { before, asked, fit: FitParams::default(), least: LEAST }
     }
 
     fn possible(&self, context: &SearchContext) -> Vec<Possible> {
@@ -72,28 +68,17 @@ impl PlanePattern {
 }
 
 impl Stage for PlanePattern {
-    fn next(&mut self, context: &SearchContext) -> Next {
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let possible = self.possible(context);
         if self.first < FIRST {
             // a third of a turn apart, near the rim
-            let angle = self.first as f64 / FIRST as f64 * std::f64::consts::TAU;
-            let direction = nalgebra::Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let direction = toward(self.first as f64 / FIRST as f64);
             let far = |p: &Possible| context.in_f(&p.point).coords.dot(&direction);
-            let Some(at) = possible.into_iter().max_by(|a, b| far(a).total_cmp(&far(b))) else {
-                return Next::Done { is_as_asked: false };
-            };
-            return Next::Touch(self.measuring.aim(&at));
+            let farthest = possible.into_iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+            return Ok(farthest.map(|farthest| self.measuring.aim(&farthest)));
         }
-        let asked = Self::asked(&context.params);
-        let known = self.measuring.known(&Self::guess(context), Self::before(context), context.params.touch_sigma);
-        if self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
-            return Next::Done { is_as_asked: true };
-        }
-        let best = self.measuring.best(&Self::guess(context), &known, possible, &asked, context.params.touch_sigma);
-        match best {
-            Some((best, _)) => Next::Touch(self.measuring.aim(&best)),
-            None => Next::Done { is_as_asked: false },
-        }
+        let (guess, params) = (Self::guess(context), &context.params);
+        Ok(self.measuring.next(&guess, &Self::wanted(params), possible, params))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -119,11 +104,7 @@ impl Stage for PlanePattern {
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
-        let (asked, sigma) = (Self::asked(&context.params), context.params.touch_sigma);
-        let guess = Self::guess(context);
-        let share =
-            || self.measuring.uncertainty_ratio(&guess, &FitParams::default(), Self::before(context), &asked, sigma);
-        (self.measuring.observations.len() >= LEAST).then(share).flatten().map(|share| share * context.params.sigma)
+        self.measuring.uncertainty(&Self::guess(context), &Self::wanted(&context.params), &context.params)
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {

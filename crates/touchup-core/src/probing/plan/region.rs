@@ -3,9 +3,9 @@
 use nalgebra::Point3;
 
 use super::error::ExploreError;
-use super::pattern::{Next, Stage, Touched};
+use super::pattern::{Stage, Touched};
 use super::search::{ROUGH, hexagonal};
-use super::search_context::{PatternParams, SearchContext};
+use super::search_context::{PatternParams, SearchContext, TouchPlan};
 use super::slide::Slide;
 use crate::features::Feature;
 
@@ -39,10 +39,9 @@ impl RegionPattern {
 }
 
 impl Stage for RegionPattern {
-    fn next(&mut self, context: &SearchContext) -> Next {
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let PatternParams { clearance, ball_radius, depth, .. } = context.params;
-        let planned = |place: &Point3<f64>| context.down(place, clearance + ball_radius + depth.max(ROUGH));
-        self.places.last().map_or(Next::Done { is_as_asked: false }, |place| Next::Touch(planned(place)))
+        Ok(self.places.last().map(|place| context.down(place, clearance + ball_radius + depth.max(ROUGH))))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {

@@ -21,6 +21,47 @@ const FLAT: f64 = 30e-6;
 /// What the scan says of the height may be off by this, m.
 pub(super) const ROUGH: f64 = 1.5e-3;
 
+/// The wall of an opening is searched this far, m.
+pub(super) const REACH: f64 = 12e-3;
+/// Touches of the surface around an opening, or of the ground around a foot.
+pub(super) const AROUND: usize = 4;
+/// They are this far beyond the wall, over the ball's radius.
+pub(super) const BESIDE: f64 = 1.3;
+/// So far beyond the wall the surface is no rim any more, m.
+pub(super) const CHAMFER: f64 = 0.5e-3;
+/// The ball stays this far above the floor, m.
+const OFF_FLOOR: f64 = 0.3e-3;
+/// The wall of an opening is touched this deep at the least, over the ball's radius: below a rim that is broken by no more, and as near to the
+/// opening as it may be, as the numbers refer to that place.
+pub(super) const BELOW_RIM: f64 = 0.7;
+/// A wall that may be touched no deeper than this, over the ball's radius, is too low.
+const TOO_LOW: f64 = 0.2;
+
+impl SearchContext {
+    /// How far below the surface a wall may be touched, with the floor of its opening at a place of the ball's centre, m.
+    pub fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
+        depth.min(self.height - centre.z - OFF_FLOOR).max(BELOW_RIM * self.params.ball_radius)
+    }
+
+    /// How far below the surface a wall may be touched that stands on the ground, m.
+    ///
+    /// - `off`: the ball stays this far above the ground, m.
+    ///
+    /// # Errors
+    /// [`ExploreError::TooLow`].
+    pub fn above_ground(&self, kind: &'static str, ground_z: f64, off: f64) -> Result<f64, ExploreError> {
+        let ball = self.params.ball_radius;
+        let deepest = self.height - ground_z - ball - off;
+        match deepest > TOO_LOW * ball {
+            true => Ok(deepest.min(SHALLOW * ball)),
+            false => {
+                let height_mm = (self.height - ground_z) * 1e3;
+                Err(ExploreError::TooLow { kind, height_mm, ball_mm: ball * 2e3 })
+            }
+        }
+    }
+}
+
 /// Searches for an opening.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpeningSearch {
@@ -31,7 +72,7 @@ pub(super) struct OpeningSearch {
 }
 
 impl OpeningSearch {
-    pub fn not_found(params: &PatternParams) -> ExploreError {
+    fn not_found(params: &PatternParams) -> ExploreError {
         ExploreError::NotFound { radius_mm: params.flag_radius * 1e3, ball_mm: params.ball_radius * 2e3 }
     }
 
@@ -42,7 +83,10 @@ impl OpeningSearch {
     }
 
     /// The next place of the search: the one not tried yet that is nearest to where the ball sank deepest, and to the flag.
-    pub fn next(&self, context: &SearchContext) -> Option<TouchPlan> {
+    ///
+    /// # Errors
+    /// [`ExploreError::NotFound`] when all have been tried.
+    pub fn next(&self, context: &SearchContext) -> Result<TouchPlan, ExploreError> {
         let PatternParams { ball_radius, clearance, .. } = context.params;
         let step = STEP * ball_radius;
         let is_new =
@@ -51,8 +95,9 @@ impl OpeningSearch {
         let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
         let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
         let places = hexagonal(step, Self::farthest(&context.params));
-        let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)))?;
-        Some(context.down(best, clearance + SHALLOW * ball_radius + ROUGH))
+        let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)));
+        let best = best.ok_or_else(|| Self::not_found(&context.params))?;
+        Ok(context.down(best, clearance + SHALLOW * ball_radius + ROUGH))
     }
 
     /// Takes a touch; the place where the ball fell in, if it did.
@@ -84,6 +129,14 @@ impl OpeningSearch {
     /// The ball slid in over a rim, and cannot be let down there again: the search goes on beside it.
     pub fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
         self.tried.push((place, 2.0 * context.params.ball_radius));
+    }
+
+    /// Why there is no feature yet.
+    pub fn not_done(context: &SearchContext, is_open: bool) -> ExploreError {
+        match is_open {
+            true => Self::not_found(&context.params),
+            false => ExploreError::NotDone { touches: context.touches },
+        }
     }
 
     /// Of the touches from above only those count where the ball lay on the surface, and not on the rim.

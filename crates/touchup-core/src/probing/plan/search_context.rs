@@ -1,8 +1,11 @@
 //! The request of a search, the touches that it plans, their results, and the frame of the search.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-use crate::features::Kind;
+use crate::features::fit::Observation;
+use crate::features::{End, Kind};
 use crate::parameters;
 
 parameters! {
@@ -154,8 +157,28 @@ impl SearchContext {
         TouchPlan { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
     }
 
+    /// Down at the flag, then at the places of a ring around it.
+    pub fn ring(&self, at: usize, radius: f64, search: f64) -> TouchPlan {
+        let far = if at == 0 { 0.0 } else { radius };
+        self.down(&Point3::from(toward(at as f64 / RING as f64) * far), search)
+    }
+
     /// The place that a ball with its centre there touches below it.
     pub fn below(&self, centre: &Point3<f64>) -> f64 {
         centre.z - self.params.ball_radius
     }
+
+    /// The same of a contact from above, in O.
+    pub fn end(&self, contact: &Observation) -> End {
+        End { point: contact.point - self.out() * contact.offset, sigma: contact.sigma }
+    }
+}
+
+/// Places around the flag, beside the flag itself.
+pub(super) const RING: usize = 6;
+
+/// The direction across the surface after a share of a turn, unit vector in F.
+pub(super) fn toward(turned: f64) -> Vector3<f64> {
+    let angle = turned * TAU;
+    Vector3::new(angle.cos(), angle.sin(), 0.0)
 }

@@ -3,11 +3,11 @@
 //! A rim is where a surface above bends down into a wall. The ball's centre stays one radius off both: straight above, around the
 //! rim on a quarter of a circle, straight down along the wall; its normal turns with it.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::search_context::SearchContext;
+use super::search_context::{SearchContext, toward};
 
 /// A station of a slide, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,8 +151,7 @@ fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
 /// - `side`: −1: the open is inside, as in a hole; 1: outside, as around a boss.
 pub(super) fn circle(middle: Point3<f64>, radius: f64, side: f64) -> impl Fn(f64) -> (Point3<f64>, Vector3<f64>) {
     move |share| {
-        let angle = share * TAU;
-        let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        let direction = toward(share);
         (middle + direction * radius, direction * side)
     }
 }

@@ -6,38 +6,31 @@
 //! 4. Along it to both ends, then down to its floor.
 //! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the largest gain.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
-use super::cylinder_fit::{BELOW_RIM, SQUARE, surface_about};
+use super::cylinder_fit::{SQUARE, square, surface_about};
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
-use super::hole::{OFF_FLOOR, numbers};
-use super::measuring::{Measuring, Possible};
-use super::pattern::{Next, Stage, Touched};
-use super::search::{OpeningSearch, ROUGH, SHALLOW};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
+use super::hole::numbers;
+use super::measuring::{Measuring, Possible, Wanted};
+use super::pattern::{Stage, Touched};
+use super::search::{AROUND, BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
+use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::{RimStation, Slide, stadium_rim};
 use super::slot_fit::SlotFit;
-use crate::features::fit::{Ends, FitParams, Freedom, Stadium, Surface, fit};
+use crate::features::fit::{Ends, Freedom, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
-/// A wall is searched this far, m.
-const REACH: f64 = 12e-3;
 /// First directions: five numbers are unknown.
 const FIRST: usize = 8;
 /// Walls that have to be touched in them.
 const LEAST_FIRST: usize = 5;
 /// An end is searched for so many times at most.
 const SEARCHES: usize = 6;
-/// Touches of the surface around the opening.
-const AROUND: usize = 4;
-/// They are this far beyond the wall, over the ball's radius.
-const BESIDE: f64 = 1.3;
 /// Places along a wall, and around an end, that are candidates.
 const ALONG: usize = 9;
-const ROUND: usize = 9;
 /// So many touches of the walls before they are believed.
 const LEAST_WALL: usize = 10;
 /// A wall is searched so much farther than expected, m.
@@ -51,11 +44,10 @@ const SLACK: f64 = 0.2e-3;
 const FLAT: f64 = 0.1e-3;
 /// … or on a rim with its centre beyond it by less than this, over its radius.
 const ON_RIM: f64 = 0.5;
-/// So far beyond the wall the surface is no rim any more, m.
-const CHAMFER: f64 = 0.5e-3;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum SlotPhase {
+    #[default]
     Opening,
     First,
     Around,
@@ -65,7 +57,7 @@ enum SlotPhase {
     Wall,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct SlotPattern {
     phase: SlotPhase,
     opening: OpeningSearch,
@@ -86,19 +78,7 @@ pub(super) struct SlotPattern {
 
 impl SlotPattern {
     pub fn new(params: &PatternParams) -> Self {
-        Self {
-            phase: SlotPhase::Opening,
-            opening: OpeningSearch::default(),
-            middle: Point3::origin(),
-            measuring: Measuring::default(),
-            slot_fit: None,
-            walls: None,
-            floor: None,
-            depth: params.depth.max(SHALLOW * params.ball_radius),
-            tried: 0,
-            free: Vec::new(),
-            on_top: Vec::new(),
-        }
+        Self { depth: params.depth.max(SHALLOW * params.ball_radius), ..Self::default() }
     }
 
     /// The walls through the contacts, at the height of the surface, so that depths are coordinates of their frame.
@@ -120,32 +100,33 @@ impl SlotPattern {
         });
     }
 
-    fn asked(params: &PatternParams, walls: &Stadium) -> Asked {
+    fn wanted(params: &PatternParams, walls: &Stadium) -> Wanted {
         let sigma = params.sigma;
         let asked = Asked::default();
-        let place = |asked: Asked| asked.and(&[(Freedom::X, 1.0)], sigma).and(&[(Freedom::Y, 1.0)], sigma);
-        match params.quantity {
-            Quantity::Position => place(asked),
-            Quantity::Axis => asked.and(&[(Freedom::TiltX, 1.0)], sigma).and(&[(Freedom::TiltY, 1.0)], sigma),
-            Quantity::Length => asked.and(&[(Freedom::Second, 1.0)], sigma),
-            Quantity::Width => asked.and(&[(Freedom::Size, 1.0)], sigma),
+        let asked = match params.quantity {
+            Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
+            Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
+            Quantity::Length => asked.each(&[Freedom::Second], sigma),
+            Quantity::Width => asked.each(&[Freedom::Size], sigma),
             Quantity::All | Quantity::Diameter => {
                 // its direction as well as its ends are known
-                let asked = place(asked).and(&[(Freedom::Turn, 1.0)], 2.0 * sigma / walls.length);
-                asked.and(&[(Freedom::Second, 1.0)], sigma).and(&[(Freedom::Size, 1.0)], sigma)
+                let asked = asked.each(&[Freedom::X, Freedom::Y], sigma);
+                asked.each(&[Freedom::Turn], 2.0 * sigma / walls.length).each(&[Freedom::Second, Freedom::Size], sigma)
             }
+        };
+        Wanted {
+            before: Knowledge::before::<Stadium>(walls.length, SQUARE),
+            asked: asked.and_the_rest::<Stadium>(sigma, walls.width / 2.0),
+            fit: square(),
+            least: LEAST_WALL,
         }
-    }
-
-    fn before(walls: &Stadium) -> Knowledge {
-        Knowledge::before::<Stadium>(walls.length, SQUARE)
     }
 
     /// The part of an end that was not touched yet: the sign of the end along the slot, and its angles. Touches that the fit holds
     /// for none of these walls do not count.
     fn open_part(&self, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let half = (walls.length - walls.width).max(0.0) / 2.0;
-        let fitted = fit(walls, &self.measuring.observations, &params()).ok();
+        let fitted = fit(walls, &self.measuring.observations, &square()).ok();
         let is_kept = |at: usize| fitted.as_ref().is_some_and(|fitted| fitted.used[at]);
         let kept = (0..self.measuring.observations.len()).filter(|at| is_kept(*at));
         let kept: Vec<_> =
@@ -173,19 +154,13 @@ impl SlotPattern {
     fn possible(&self, context: &SearchContext, walls: &Stadium, part: Option<(f64, [f64; 2])>) -> Vec<Possible> {
         let (half, radius) = ((walls.length - walls.width).max(0.0) / 2.0, walls.width / 2.0);
         let travel = radius - context.params.ball_radius;
-        let spread = |at: usize, count: usize| at as f64 / (count - 1) as f64 * 2.0 - 1.0;
-        let straight = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|side| (spread(at, ALONG) * half, side * PI / 2.0)));
-        let round = (0..ROUND).flat_map(|at| {
-            let angle = spread(at, ROUND) * PI / 3.0;
-            [(half, angle), (-half, PI - angle)]
-        });
         let is_wanted = |&(x, angle): &(f64, f64)| {
             part.is_none_or(|(sign, [low, high])| {
                 let from_end = if sign > 0.0 { angle } else { PI - angle };
                 sign * x >= half && from_end > low && from_end < high
             })
         };
-        let places: Vec<(f64, f64)> = straight.chain(round).filter(is_wanted).collect();
+        let places = around_stadium(half, ALONG).filter(is_wanted);
         let depths = [BELOW_RIM * context.params.ball_radius, self.depth];
         let planned = |(x, angle): (f64, f64), depth: f64| {
             let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
@@ -194,14 +169,11 @@ impl SlotPattern {
             let point = walls.pose_of * (Point3::new(x, 0.0, -depth) + direction * radius);
             Possible { point, travel, planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND) }
         };
-        places.into_iter().flat_map(|place| depths.map(|depth| planned(place, depth))).collect()
+        places.flat_map(|place| depths.map(|depth| planned(place, depth))).collect()
     }
 
     fn not_done(&self, context: &SearchContext) -> ExploreError {
-        match self.phase {
-            SlotPhase::Opening => OpeningSearch::not_found(&context.params),
-            _ => ExploreError::NotDone { touches: context.touches },
-        }
+        OpeningSearch::not_done(context, self.phase == SlotPhase::Opening)
     }
 
     fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
@@ -268,27 +240,11 @@ impl SlotPattern {
     }
 
     fn take_floor(&mut self, context: &SearchContext, touch: &Touched) {
-        self.floor = touch.observation.map(|o| End { point: o.point - context.out() * o.offset, sigma: o.sigma });
+        self.floor = touch.observation.map(|contact| context.end(&contact));
         if let Some(centre) = touch.place {
-            let deepest = context.height - centre.z - OFF_FLOOR;
-            self.depth = self.depth.min(deepest).max(BELOW_RIM * context.params.ball_radius);
+            self.depth = context.above_floor(self.depth, &centre);
         }
         self.phase = SlotPhase::Wall;
-    }
-
-    /// The next planned touch while walls and ends are measured.
-    fn next_wall(&mut self, context: &SearchContext, walls: &Stadium) -> Next {
-        let asked = Self::asked(&context.params, walls);
-        if self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma) {
-            return Next::Done { is_as_asked: true };
-        }
-        let asked = asked.and_the_rest::<Stadium>(context.params.sigma, walls.width / 2.0);
-        let known = self.measuring.known(walls, Self::before(walls), context.params.touch_sigma);
-        let possible = self.possible(context, walls, self.open_part(walls));
-        match self.measuring.best(walls, &known, possible, &asked, context.params.touch_sigma) {
-            Some((best, _)) => Next::Touch(self.measuring.aim(&best)),
-            None => Next::Done { is_as_asked: false },
-        }
     }
 }
 
@@ -297,45 +253,60 @@ fn end_of(planned: &TouchPlan) -> Point3<f64> {
     planned.from + planned.direction.into_inner() * planned.search
 }
 
-fn params() -> FitParams {
-    FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() }
+/// Places around the walls of a slot: along each side, then about the middle of each end; x of the middle line that a place is touched
+/// from, and the angle towards it.
+pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f64, f64)> {
+    let spread = move |at: usize| at as f64 / (count - 1) as f64 * 2.0 - 1.0;
+    let sides = (0..count).flat_map(move |at| [-PI, PI].map(|turn| (spread(at) * half, turn / 2.0)));
+    let ends = (0..count).flat_map(move |at| {
+        let angle = spread(at) * PI / 3.0;
+        [(half, angle), (-half, PI - angle)]
+    });
+    sides.chain(ends)
 }
 
 impl Stage for SlotPattern {
-    fn next(&mut self, context: &SearchContext) -> Next {
+    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let ball = context.params.ball_radius;
         let shallow = SHALLOW * ball;
-        if self.phase == SlotPhase::Opening {
-            let planned = self.opening.next(context);
-            return planned.map_or_else(|| Next::Failed(OpeningSearch::not_found(&context.params)), Next::Touch);
+        match self.phase {
+            SlotPhase::Opening => return self.opening.next(context).map(Some),
+            SlotPhase::First => {
+                let direction = toward(self.tried as f64 / FIRST as f64);
+                return Ok(Some(context.sideways(&self.middle, shallow, &direction, REACH)));
+            }
+            _ => {}
         }
-        if self.phase == SlotPhase::First {
-            let angle = self.tried as f64 / FIRST as f64 * TAU;
-            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            return Next::Touch(context.sideways(&self.middle, shallow, &direction, REACH));
-        }
-        let Some(walls) = self.walls.filter(|_| self.measuring.observations.len() >= LEAST_FIRST) else {
-            let walls = self.measuring.observations.len();
-            return Next::Failed(ExploreError::NoWall { kind: "slot", walls, asked: FIRST, reach_mm: REACH * 1e3 });
-        };
+        let touched = self.measuring.observations.len();
+        let walls = self.walls.filter(|_| touched >= LEAST_FIRST);
+        let no_wall = ExploreError::NoWall { kind: "slot", walls: touched, asked: FIRST, reach_mm: REACH * 1e3 };
+        let walls = walls.ok_or(no_wall)?;
         let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
         let centre = context.in_f(&walls.center());
-        match self.phase {
-            SlotPhase::Opening | SlotPhase::First => unreachable!("these have returned"),
+        Ok(Some(match self.phase {
             SlotPhase::Around => {
                 // beside both walls, towards both ends
                 let [x, y] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]][self.tried];
                 let side = Vector3::new(x * walls.length / 3.0, y * (walls.width / 2.0 + BESIDE * ball), 0.0);
-                Next::Touch(context.down(&(centre + in_f(side)), context.params.clearance + 2.0 * ball + ROUGH))
+                context.down(&(centre + in_f(side)), context.params.clearance + 2.0 * ball + ROUGH)
             }
-            SlotPhase::End(..) if self.tried >= SEARCHES => Next::Failed(ExploreError::NoEnd { searches: self.tried }),
+            SlotPhase::End(..) if self.tried >= SEARCHES => return Err(ExploreError::NoEnd { searches: self.tried }),
             SlotPhase::End(sign, beyond) => {
                 let from = self.end_from(context, &walls, sign, beyond);
-                Next::Touch(context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball))
+                context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball)
             }
-            SlotPhase::Floor => Next::Touch(context.sideways(&centre, shallow, &-Vector3::z(), REACH)),
-            SlotPhase::Wall => self.next_wall(context, &walls),
-        }
+            SlotPhase::Floor => context.sideways(&centre, shallow, &-Vector3::z(), REACH),
+            // those before have returned
+            SlotPhase::Wall | SlotPhase::Opening | SlotPhase::First => {
+                let possible = self.possible(context, &walls, self.open_part(&walls));
+                return Ok(self.measuring.next(
+                    &walls,
+                    &Self::wanted(&context.params, &walls),
+                    possible,
+                    &context.params,
+                ));
+            }
+        }))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -362,7 +333,7 @@ impl Stage for SlotPattern {
         let walls =
             self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(|| self.not_done(context))?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
-        let fitted = fit(walls, &self.measuring.observations, &params())?;
+        let fitted = fit(walls, &self.measuring.observations, &square())?;
         // where an end was not touched it has no length, and no middle
         fitted.length().ok_or_else(|| self.not_done(context))?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
@@ -372,12 +343,8 @@ impl Stage for SlotPattern {
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let walls = self.walls.as_ref().filter(|_| self.phase == SlotPhase::Wall)?;
         let is_determined = self.open_part(walls).is_none() && self.is_consistent(context, walls);
-        let asked = Self::asked(&context.params, walls);
-        let share = || {
-            self.measuring.uncertainty_ratio(walls, &params(), Self::before(walls), &asked, context.params.touch_sigma)
-        };
-        let has_enough = self.measuring.observations.len() >= LEAST_WALL;
-        (has_enough && is_determined).then(share).flatten().map(|share| share * context.params.sigma)
+        let known = || self.measuring.uncertainty(walls, &Self::wanted(&context.params, walls), &context.params);
+        is_determined.then(known).flatten()
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
