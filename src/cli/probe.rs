@@ -11,7 +11,7 @@ use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of};
 use super::{CliError, Losses, counted, print_report};
 use crate::probing::arm::{Arm, Narrower};
-use crate::probing::execute::{Flag, Plan};
+use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
 
 #[derive(Debug, Args)]
 pub(super) struct ProbeArguments {
@@ -158,17 +158,16 @@ impl DryRunReport {
 impl PlannedFeature {
     fn of(flag: u32, plan: &Plan) -> Self {
         let [touches, slides] = [plan.touches.len(), plan.slides.len()];
-        // slides are numbered on after the touches
-        let unreachable = |numbers: Range<usize>| {
-            let held_back = plan.held_back.iter().filter(|(number, _)| numbers.contains(number));
-            let one = |(number, reason): &(usize, String)| Unreachable {
-                number: number - numbers.start,
-                reason: reason.clone(),
+        let mut planned =
+            Self { flag, touches, unreachable_touches: Vec::new(), slides, unreachable_slides: Vec::new() };
+        for HeldBack { what, why } in &plan.held_back {
+            let (unreachable, number) = match *what {
+                PlannedMotion::Touch(number) => (&mut planned.unreachable_touches, number),
+                PlannedMotion::Slide(number) => (&mut planned.unreachable_slides, number),
             };
-            held_back.map(one).collect()
-        };
-        let [unreachable_touches, unreachable_slides] = [0..touches, touches..usize::MAX].map(unreachable);
-        Self { flag, touches, unreachable_touches, slides, unreachable_slides }
+            unreachable.push(Unreachable { number, reason: why.clone() });
+        }
+        planned
     }
 }
 
@@ -208,12 +207,12 @@ mod tests {
     use super::*;
     use crate::probing::plan::TouchPlan;
 
-    /// A plan numbers its slides on after its touches.
     #[test]
     fn a_slide_that_cannot_be_made_is_no_touch() {
         let (entry, from) = (Point3::origin(), Point3::origin());
         let touch = TouchPlan { entry, from, direction: Vector3::z_axis(), search: 1e-3, expected: None };
-        let held_back = [1, 2].map(|number| (number, format!("reason {number}"))).to_vec();
+        let held_back = [(PlannedMotion::Touch(1), "reason 1"), (PlannedMotion::Slide(0), "reason 2")];
+        let held_back = held_back.map(|(what, why)| HeldBack { what, why: why.to_owned() }).to_vec();
         let plan = Plan { touches: vec![touch; 2], held_back, ..Plan::default() };
         let planned = PlannedFeature::of(7, &plan);
         let numbers = |unreachable: &[Unreachable]| -> Vec<(usize, String)> {

@@ -18,7 +18,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("live", "clock stylus mesh reconstruct haptic"),
     ("plan", "numeric parameters stylus mesh features"),
     ("arm", "numeric parameters stylus plan"),
-    ("execute", "numeric parameters stylus mesh features plan arm"),
+    ("execute", "numeric parameters stylus mesh features calibrate plan arm"),
     ("sim", "numeric stylus mesh arm"),
     ("features", "numeric stylus mesh"),
     ("align", "numeric mesh features"),

@@ -12,8 +12,8 @@ use super::super::arm::RobotName;
 use super::super::{CliError, Losses};
 use super::payload::{PayloadArguments, PayloadFound, warn_of_residuals};
 use super::{Change, DraftScene, rounded};
-use crate::calibrate::{PayloadError, PayloadParams, StaticPose, fit_payload};
-use crate::probing::execute::{NotReached, PayloadReading, PayloadReadings};
+use crate::calibrate::{PayloadError, PayloadParams, fit_payload};
+use crate::probing::execute::{NotReached, PayloadReadings};
 use crate::scene::{Scene, Setting};
 use crate::sim::ArmParams;
 
@@ -25,20 +25,13 @@ pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<
     let stage = "identify the payload";
     let (readings, _) = cell.measure(robot, scene, stage, truth, |prober| prober.measure_payload())?;
     let PayloadReadings { segments, not_reached } = readings;
-    let poses: Vec<StaticPose> = segments.iter().map(static_pose).collect();
     let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
-    let fit = fit_payload(&poses, &params).map_err(|error| CliError::Arm(advice(&error)))?;
+    let fit = fit_payload(&segments, &params).map_err(|error| CliError::Arm(advice(&error)))?;
     warn_of_residuals(&fit, "does a hose pull, ");
     let payload = PayloadFound::of(&fit, ["flange", "base"]);
     let found = WeighedFound { payload, not_reached: not_reached.iter().map(NotReached::to_string).collect() };
     target.write(&draft, &found.change(&draft), &found)?;
     Ok(Losses::new())
-}
-
-/// The raw wrench is in the axes of the flange, and so is the orientation.
-fn static_pose(reading: &PayloadReading) -> StaticPose {
-    let PayloadReading { r_bf, wrench_f, noise, readings } = *reading;
-    StaticPose { r_wt: r_bf, wrench: wrench_f, noise: Some(noise), samples: readings }
 }
 
 /// Why the static segments of an arm do not determine its payload.

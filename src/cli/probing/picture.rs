@@ -8,7 +8,7 @@ use crate::cli::pictures::write_picture;
 use crate::cli::{CliError, counted};
 use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
 use crate::mesh::TriMesh;
-use crate::probing::execute::{Flag, Plan, Probed};
+use crate::probing::execute::{Flag, Plan, PlannedMotion, Probed};
 
 const PART: Rgb = [206, 209, 214];
 const FLAG: Rgb = [20, 20, 20];
@@ -61,7 +61,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
             drawing.line(&pair[0], &pair[1], LINE * size, PATH);
         }
         for (number, planned) in plan.touches.iter().enumerate() {
-            let is_held_back = plan.held_back.iter().any(|(at, _)| *at == number);
+            let is_held_back = plan.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number));
             let colour = if is_held_back { HELD_BACK } else { SEARCH };
             let end: Point3<f64> = planned.from + planned.direction.into_inner() * planned.search;
             drawing.line(&planned.from, &end, LINE * size, colour);

@@ -16,6 +16,7 @@ mod tip_by_plane;
 
 pub use dwell::{Dwell, DwellFinder, DwellParams};
 pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
+pub(crate) use static_segments::SampleBlock;
 pub use static_segments::{StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};
 pub use tip_by_plane::{PlaneTipError, PlaneTipFit, fit_tip_by_plane};

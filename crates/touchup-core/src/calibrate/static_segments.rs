@@ -54,9 +54,9 @@ impl Default for StaticSegmentParams {
 
 /// A block, or blocks that belong together.
 #[derive(Clone, Copy, Debug)]
-struct Block {
+pub(crate) struct SampleBlock {
     begin_ns: i64,
-    end_ns: i64,
+    pub end_ns: i64,
     count: usize,
     /// Σ q, each turned to the half of the first
     orientation: Quaternion<f64>,
@@ -68,8 +68,8 @@ struct Block {
     last_force: Vector3<f64>,
 }
 
-impl Block {
-    fn of(sample: &Sample) -> Self {
+impl SampleBlock {
+    pub fn of(sample: &Sample) -> Self {
         let Sample { stamp_ns, pose_ot, wrench } = sample;
         let orientation = *pose_ot.rotation.quaternion();
         Self {
@@ -85,7 +85,7 @@ impl Block {
         }
     }
 
-    fn add(&mut self, sample: &Sample) {
+    pub fn add(&mut self, sample: &Sample) {
         let mut other = Self::of(sample);
         other.squares = (sample.wrench.force - self.last_force).norm_squared();
         other.differences = 1;
@@ -108,7 +108,7 @@ impl Block {
         UnitQuaternion::from_quaternion(self.orientation)
     }
 
-    fn static_pose(&self) -> StaticPose {
+    pub fn static_pose(&self) -> StaticPose {
         let n = self.count as f64;
         // a difference of two readings has twice the variance of one, on three axes
         let noise = (self.differences > 0).then(|| (self.squares / (6 * self.differences) as f64).sqrt());
@@ -133,11 +133,11 @@ impl Block {
 #[derive(Debug)]
 pub struct StaticSegmentFinder {
     params: StaticSegmentParams,
-    block: Option<Block>,
+    block: Option<SampleBlock>,
     /// the last whole block
-    last: Option<Block>,
+    last: Option<SampleBlock>,
     /// blocks of the segment so far, and its first
-    phase: Option<(Block, Block)>,
+    phase: Option<(SampleBlock, SampleBlock)>,
     found: Vec<StaticPose>,
 }
 
@@ -155,7 +155,7 @@ impl StaticSegmentFinder {
         match &mut self.block {
             Some(block) if sample.stamp_ns.saturating_sub(block.begin_ns) < self.params.block_ns => block.add(sample),
             block => {
-                let whole = block.replace(Block::of(sample));
+                let whole = block.replace(SampleBlock::of(sample));
                 whole.into_iter().for_each(|whole| self.take(whole));
             }
         }
@@ -168,7 +168,7 @@ impl StaticSegmentFinder {
         self.found
     }
 
-    fn take(&mut self, block: Block) {
+    fn take(&mut self, block: SampleBlock) {
         let is_static = self.last.is_some_and(|last| self.is_static(&last, &block));
         match &mut self.phase {
             Some((phase, first)) if is_static && is_near(first, &block, self.params.largest_turn) => phase.join(&block),
@@ -187,10 +187,10 @@ impl StaticSegmentFinder {
         }
     }
 
-    fn is_static(&self, before: &Block, after: &Block) -> bool {
+    fn is_static(&self, before: &SampleBlock, after: &SampleBlock) -> bool {
         let apart_ns = after.begin_ns.saturating_sub(before.begin_ns).max(1);
         let seconds = apart_ns as f64 * 1e-9;
-        let change = |of: fn(&Block) -> Vector3<f64>| {
+        let change = |of: fn(&SampleBlock) -> Vector3<f64>| {
             (of(after) / after.count as f64 - of(before) / before.count as f64).norm() / seconds
         };
         let StaticSegmentParams { block_ns, turning, force_rate, torque_rate, .. } = self.params;
@@ -202,6 +202,6 @@ impl StaticSegmentFinder {
     }
 }
 
-fn is_near(first: &Block, block: &Block, largest_turn: f64) -> bool {
+fn is_near(first: &SampleBlock, block: &SampleBlock, largest_turn: f64) -> bool {
     first.rotation().angle_to(&block.rotation()) < largest_turn
 }

@@ -38,14 +38,16 @@ pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
 
 /// A dry run.
 pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
-    let held_back = plan.held_back.iter().map(|(touch, why)| format!("touch {touch}: {why}"));
     let (code, message) = match plan.held_back.len() {
         0 => {
             let slides =
                 if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
             (ProbeResult::PLANNED, format!("{} touches{slides} planned; the path is published", plan.touches.len()))
         }
-        _ => (ProbeResult::OUT_OF_LIMITS, held_back.collect::<Vec<_>>().join("; ")),
+        _ => {
+            let held_back: Vec<String> = plan.held_back.iter().map(ToString::to_string).collect();
+            (ProbeResult::OUT_OF_LIMITS, held_back.join("; "))
+        }
     };
     refused(target, code, message)
 }
@@ -270,6 +272,7 @@ fn curve_of(touch: ProbeTouch, record: &TouchRecord) -> ProbeTouch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::probing::execute::{HeldBack, PlannedMotion};
 
     fn touch(rows: usize) -> ProbeTouch {
         let curve: Vec<f32> = (0..rows).map(|i| i as f32).collect();
@@ -291,6 +294,16 @@ mod tests {
         assert_eq!((long.curve_time[0], long.curve_time.last()), (0.0, Some(&59_999.0)));
         assert_eq!(long.curve_time, long.curve_lateral_force);
         assert_eq!(downsampled(touch(20)), touch(20));
+    }
+
+    #[test]
+    fn what_cannot_be_made_is_named_a_touch_or_a_slide() {
+        let held_back = [(PlannedMotion::Touch(2), "too far"), (PlannedMotion::Slide(0), "too low")];
+        let held_back = held_back.map(|(what, why)| HeldBack { what, why: why.to_owned() }).to_vec();
+        let target = ProbeTarget { id: 7, kind: None, place: Point3::origin(), radius: 3e-3 };
+        let result = planned(&target, &Plan { held_back, ..Plan::default() });
+        assert_eq!(result.code, ProbeResult::OUT_OF_LIMITS);
+        assert_eq!(result.message, "touch 2: too far; slide 0: too low");
     }
 
     #[test]

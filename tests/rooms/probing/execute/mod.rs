@@ -1,3 +1,21 @@
 mod command;
 mod planning;
 mod sliding;
+
+use nalgebra::Point3;
+use touchup::probing::arm::{Limits, TouchParams};
+use touchup::probing::execute::{Cell, ProbeParams, Tool};
+use touchup::probing::plan::PatternParams;
+use touchup::sim::ArmParams;
+
+fn cell() -> Cell {
+    let ArmParams { geometry, pose_bo, pose_ft, .. } = ArmParams::default();
+    Cell { geometry, pose_bo, pose_ft, tool: Tool::default() }
+}
+
+fn params() -> ProbeParams {
+    let limits =
+        Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() };
+    let pattern = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+    ProbeParams { touch: TouchParams::default(), pattern, slides: false, limits }
+}

@@ -9,12 +9,14 @@ use rand_pcg::Pcg64;
 use touchup::features::Kind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
-use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, TouchParams, UrGeometry};
+use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, UrGeometry};
 use touchup::probing::execute::{
-    Cell, Ending, Flag, ProbeParams, Probed, Prober, Progress, Tool, World, plan, turning_place,
+    Cell, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan, turning_place,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
+
+use super::{cell, params};
 
 /// A mesh that stays unchanged.
 struct StaticScan {
@@ -70,18 +72,6 @@ impl World for StaticScan {
     fn publish(&mut self, progress: &Progress) {
         self.touches.push(progress.touch);
     }
-}
-
-fn cell() -> Cell {
-    let ArmParams { geometry, pose_bo, pose_ft, .. } = ArmParams::default();
-    Cell { geometry, pose_bo, pose_ft, tool: Tool::default() }
-}
-
-fn params() -> ProbeParams {
-    let limits =
-        Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() };
-    let pattern = PatternParams { sigma: 10e-6, ..PatternParams::default() };
-    ProbeParams { touch: TouchParams::default(), pattern, slides: false, limits }
 }
 
 fn plate_scan() -> TriMesh {
@@ -500,7 +490,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             let planned = plan(&cell, &params, &world, &flag, &now).unwrap();
             moves.plans += 1;
             for (number, planned_touch) in planned.touches.iter().enumerate() {
-                if planned.held_back.iter().any(|(at, _)| *at == number) {
+                if planned.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number)) {
                     continue;
                 }
                 moves.touches += 1;

@@ -6,27 +6,19 @@ use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
     Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideStation, SlideTarget, TouchParams, Watched,
 };
-use touchup::probing::execute::{
-    Cell, Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, Tool, World, plan,
-};
-use touchup::probing::plan::{PatternParams, Slide};
+use touchup::probing::execute::{Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan};
+use touchup::probing::plan::Slide;
 use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
+
+use super::cell;
 
 /// Top of the plate, m.
 const TOP: f64 = 12e-3;
 /// Of the ball, m.
 const BALL: f64 = 1.5e-3;
 
-fn cell() -> Cell {
-    let ArmParams { geometry, pose_bo, pose_ft, .. } = ArmParams::default();
-    Cell { geometry, pose_bo, pose_ft, tool: Tool::default() }
-}
-
 fn params() -> ProbeParams {
-    let limits =
-        Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() };
-    let pattern = PatternParams { sigma: 10e-6, ..PatternParams::default() };
-    ProbeParams { touch: TouchParams::default(), pattern, slides: true, limits }
+    ProbeParams { slides: true, ..super::params() }
 }
 
 fn flag(kind: Option<Kind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {

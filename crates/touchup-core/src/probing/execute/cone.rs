@@ -12,19 +12,13 @@ pub struct Orientation {
 }
 
 /// An orientation that the arm does not get to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{:.0}° towards {:.0}°: {why}", orientation.lean.to_degrees(), orientation.towards.to_degrees())]
 pub struct NotReached {
     /// which
     pub orientation: Orientation,
     /// in words
     pub why: String,
-}
-
-impl std::fmt::Display for NotReached {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Orientation { lean, towards } = self.orientation;
-        write!(f, "{:.0}° towards {:.0}°: {}", lean.to_degrees(), towards.to_degrees(), self.why)
-    }
 }
 
 /// Orientations of some leans (°), each with so many around it.

@@ -1,13 +1,35 @@
 //! Dry run: the touches and paths that the current mesh leads to, checked, without moving the arm.
 
-use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 
 use super::cell::Cell;
+use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
-use super::route::{Barred, Route, ToolState, may_slide, may_touch, route};
+use super::route::{ToolState, may_slide, may_touch, route};
 use super::world::{World, distance, normal_about, on_mesh};
-use crate::probing::arm::ArmState;
+use crate::probing::arm::{ArmState, Joints, LimitError};
 use crate::probing::plan::{ExploreError, Explorer, PatternParams, Slide, TouchPlan, TouchResult};
+
+/// A planned motion, with its number from 0 on among those of its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlannedMotion {
+    /// of [`Plan::touches`]
+    #[error("touch {0}")]
+    Touch(usize),
+    /// of [`Plan::slides`]
+    #[error("slide {0}")]
+    Slide(usize),
+}
+
+/// A planned touch or slide that cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: {why}")]
+pub struct HeldBack {
+    /// which
+    pub what: PlannedMotion,
+    /// in words
+    pub why: String,
+}
 
 /// The plan for a flag.
 #[derive(Clone, Debug, Default)]
@@ -20,18 +42,8 @@ pub struct Plan {
     pub touches: Vec<TouchPlan>,
     /// the slides after them
     pub slides: Vec<Slide>,
-    /// what cannot be done, in words, with the number of the touch; slides are counted on
-    pub held_back: Vec<(usize, String)>,
-}
-
-impl Plan {
-    fn go(&mut self, at: &mut ToolState, stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>) {
-        for (place, turned) in stops {
-            self.links.push([at.place, place]);
-            self.path.push(place);
-            (at.place, at.rotation) = (place, turned);
-        }
-    }
+    /// what cannot be done
+    pub held_back: Vec<HeldBack>,
 }
 
 /// Plans the probing of a flag.
@@ -53,26 +65,27 @@ pub fn plan(
     let pattern = PatternParams { flag_radius: flag.radius, ..params.pattern };
     let mut explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
     let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
-    let mut at = ToolState { place: cell.place(&now.pose_bt), rotation: now.pose_bt.rotation, joints: now.joints };
+    let mut at = ToolState::of(cell, now);
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
+    let reach = |reached: Result<Joints, LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
+        let joints = reached?;
+        for (place, turned) in route(cell, &params.limits, world, at, &rotation, above)?.stops {
+            plan.links.push([at.place, place]);
+            plan.path.push(place);
+            (at.place, at.rotation) = (place, turned);
+        }
+        at.joints = joints;
+        Ok::<_, Ending>(())
+    };
     while let Some(planned) = explorer.next_touch() {
-        let number = plan.touches.len();
+        let what = PlannedMotion::Touch(plan.touches.len());
         plan.touches.push(planned);
-        let reached = may_touch(cell, &params.limits, &rotation, &planned, &at.joints).map_err(Barred::from);
-        let routed = reached
-            .and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &planned.entry)?)));
-        let stops = match routed {
-            Ok((joints, Route { stops, .. })) => {
-                at.joints = joints;
-                stops
-            }
-            Err(error) => {
-                plan.held_back.push((number, error.to_string()));
-                explorer.take(&TouchResult::Unclear);
-                continue;
-            }
-        };
-        plan.go(&mut at, stops);
+        let reached = may_touch(cell, &params.limits, &rotation, &planned, &at.joints);
+        if let Err(ending) = reach(reached, &planned.entry, &mut at, &mut plan) {
+            plan.held_back.push(HeldBack { what, why: ending.why() });
+            explorer.take(&TouchResult::Unclear);
+            continue;
+        }
         let result = contact_on_mesh(&planned, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
         let end = if let TouchResult::At { centre, .. } = result { centre } else { planned.from };
         // in again and out, slowly
@@ -81,19 +94,16 @@ pub fn plan(
     }
     let slides = if params.slides { explorer.slides() } else { Vec::new() };
     for slide in slides {
-        let reached = may_slide(cell, &params.limits, &rotation, &slide, &at.joints).map_err(Barred::from);
-        let routed = reached
-            .and_then(|joints| Ok((joints, route(cell, &params.limits, world, &at, &rotation, &slide.above(0))?)));
-        match routed {
-            Ok((joints, Route { stops, .. })) => {
-                at.joints = joints;
-                plan.go(&mut at, stops);
+        let what = PlannedMotion::Slide(plan.slides.len());
+        let reached = may_slide(cell, &params.limits, &rotation, &slide, &at.joints);
+        match reach(reached, &slide.above(0), &mut at, &mut plan) {
+            Ok(()) => {
                 let last = slide.stations.len() - 1;
                 plan.path.extend([slide.above(0), slide.lifted(0)]);
                 plan.path.extend(slide.stations.iter().map(|station| station.centre));
                 plan.path.extend([slide.lifted(last), slide.above(last), at.place]);
             }
-            Err(error) => plan.held_back.push((plan.touches.len() + plan.slides.len(), error.to_string())),
+            Err(ending) => plan.held_back.push(HeldBack { what, why: ending.why() }),
         }
         plan.slides.push(slide);
     }

@@ -1,44 +1,61 @@
 //! How the probing of a feature ended, and all that was measured.
 
+use std::error::Error;
+
 use nalgebra::Point3;
 
 use super::links::LinkError;
 use crate::probing::arm::{LimitError, ProbeError, SlideRecord, TouchRecord};
 use crate::probing::plan::{ExploreError, Found, Slide, TouchPlan};
 
-/// How it ended.
-#[derive(Clone, Debug, PartialEq)]
+/// How it ended; as an error, why it ended before all was done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Ending {
     /// The number has the requested uncertainty.
+    #[error("tolerance reached")]
     ToleranceReached,
     /// The touches are spent; it is as good as they made it.
+    #[error("tolerance not reached: the touches are spent")]
     TouchesSpent,
     /// The time is spent.
+    #[error("tolerance not reached: the time is spent")]
     TimeSpent,
     /// There is no such feature where it was searched.
-    NothingFound(ExploreError),
+    #[error("nothing found: {0}")]
+    NothingFound(#[from] ExploreError),
     /// A request cancelled it: the arm stopped, and retracted.
+    #[error("cancelled: the arm stopped and retracted")]
     Cancelled,
     /// The arm did not move: it would leave its limits.
-    OutOfLimits(LimitError),
+    #[error("not begun: {0}")]
+    OutOfLimits(#[from] LimitError),
     /// The arm did not move: no path is clear of the mesh.
-    NoClearPath(LinkError),
+    #[error("not begun: {0}")]
+    NoClearPath(#[from] LinkError),
     /// The arm stopped.
-    Stopped(ProbeError),
+    #[error("stopped: {0}")]
+    Stopped(#[source] ProbeError),
 }
 
-impl std::fmt::Display for Ending {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::ToleranceReached => f.write_str("tolerance reached"),
-            Self::TouchesSpent => f.write_str("tolerance not reached: the touches are spent"),
-            Self::TimeSpent => f.write_str("tolerance not reached: the time is spent"),
-            Self::NothingFound(error) => write!(f, "nothing found: {error}"),
-            Self::Cancelled => f.write_str("cancelled: the arm stopped and retracted"),
-            Self::OutOfLimits(error) => write!(f, "not begun: {error}"),
-            Self::NoClearPath(error) => write!(f, "not begun: {error}"),
-            Self::Stopped(error) => write!(f, "stopped: {error}"),
+impl From<ProbeError> for Ending {
+    fn from(error: ProbeError) -> Self {
+        match error {
+            ProbeError::Cancelled { .. } => Self::Cancelled,
+            error => Self::Stopped(error),
         }
+    }
+}
+
+impl Ending {
+    /// The reason alone.
+    pub(super) fn why(&self) -> String {
+        self.source().map_or_else(|| self.to_string(), ToString::to_string)
+    }
+
+    /// Whether only this touch or slide cannot be made.
+    pub(super) fn is_of_one(&self) -> bool {
+        use Ending::{NoClearPath, OutOfLimits, Stopped};
+        matches!(self, OutOfLimits(_) | NoClearPath(_) | Stopped(ProbeError::Obstacle { is_link: false, .. }))
     }
 }
 
@@ -55,14 +72,6 @@ pub struct ProbedTouch {
     pub deviation: Option<f64>,
     /// why it does not count; `None`: it does
     pub refused: Option<String>,
-}
-
-impl Probed {
-    /// Before the first motion.
-    pub(super) fn not_begun(flag: u32, ending: Ending) -> Self {
-        let (touches, slides) = (Vec::new(), Vec::new());
-        Self { flag, ending, found: None, touches, slides, seconds: 0.0, peak_force: 0.0 }
-    }
 }
 
 /// One slide of a probing.

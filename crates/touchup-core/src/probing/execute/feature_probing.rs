@@ -2,46 +2,9 @@
 
 use nalgebra::{Point3, UnitQuaternion};
 
-use super::ending::{Ending, ProbedSlide, ProbedTouch};
-use super::links::LinkError;
-use super::route::{Barred, ToolState};
-use crate::probing::arm::{LimitError, ProbeError, Watched};
-use crate::probing::plan::ExploreError;
-
-/// Why a probing ended before its explorer had enough.
-pub(super) enum EarlyEnd {
-    Explore(ExploreError),
-    Arm(ProbeError),
-    Limit(LimitError),
-    Link(LinkError),
-}
-
-impl From<EarlyEnd> for Ending {
-    fn from(broken: EarlyEnd) -> Self {
-        match broken {
-            EarlyEnd::Explore(error) => Self::NothingFound(error),
-            EarlyEnd::Arm(ProbeError::Cancelled { .. }) => Self::Cancelled,
-            EarlyEnd::Arm(error) => Self::Stopped(error),
-            EarlyEnd::Limit(error) => Self::OutOfLimits(error),
-            EarlyEnd::Link(error) => Self::NoClearPath(error),
-        }
-    }
-}
-
-impl From<Barred> for EarlyEnd {
-    fn from(barred: Barred) -> Self {
-        match barred {
-            Barred::Limit(error) => Self::Limit(error),
-            Barred::Link(error) => Self::Link(error),
-        }
-    }
-}
-
-impl From<ProbeError> for EarlyEnd {
-    fn from(error: ProbeError) -> Self {
-        Self::Arm(error)
-    }
-}
+use super::ending::{ProbedSlide, ProbedTouch};
+use super::route::ToolState;
+use crate::probing::arm::Watched;
 
 /// A feature that is being probed.
 pub(super) struct FeatureProbing {

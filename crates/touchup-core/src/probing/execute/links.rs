@@ -69,6 +69,8 @@ pub enum LinkError {
 const HEIGHTS: usize = 6;
 /// Least step along a line, m.
 const LEAST_STEP: f64 = 20e-6;
+/// Least step of a turn, rad: by it the far end of a shaft of 60 mm moves by 0.06 mm.
+const LEAST_TURN: f64 = 1e-3;
 
 impl Tool {
     /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh, or nearer than the margin, and
@@ -110,24 +112,10 @@ impl Tool {
     ) -> bool {
         let length = (to - from).norm();
         let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
-        let mut gone = 0.0;
-        loop {
-            let room = self.room(&(from + direction * gone), shaft, distance, length - gone);
-            if room < 0.0 {
-                return false;
-            }
-            if gone >= length {
-                return true;
-            }
-            gone = (gone + room.max(LEAST_STEP)).min(length);
-        }
+        let room = |gone: f64| self.room(&(from + direction * gone), shaft, distance, length - gone);
+        is_clear_along(length, room, |room| room.max(LEAST_STEP))
     }
-}
 
-/// Least step of a turn, rad: by it the far end of a shaft of 60 mm moves by 0.06 mm.
-const LEAST_TURN: f64 = 1e-3;
-
-impl Tool {
     /// Whether the tool keeps clear while it turns about the ball.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it.
@@ -139,18 +127,26 @@ impl Tool {
         distance: &dyn Fn(&Point3<f64>, f64) -> f64,
     ) -> bool {
         let length = self.shaft_length + self.shaft_radius;
-        let mut turned = 0.0;
-        loop {
-            // nothing of it moves farther than its far end
-            let room = self.room(centre, &shaft(turned / angle), distance, length * (angle - turned));
-            if room < 0.0 {
-                return false;
-            }
-            if turned >= angle {
-                return true;
-            }
-            turned = (turned + (room / length).max(LEAST_TURN)).min(angle);
+        // nothing of it moves farther than its far end
+        let room = |turned: f64| self.room(centre, &shaft(turned / angle), distance, length * (angle - turned));
+        is_clear_along(angle, room, |room| (room / length).max(LEAST_TURN))
+    }
+}
+
+/// Whether there is room all along a path from 0 to an end.
+///
+/// - `step`: how far along a room leads at least.
+fn is_clear_along(end: f64, room: impl Fn(f64) -> f64, step: impl Fn(f64) -> f64) -> bool {
+    let mut at = 0.0;
+    loop {
+        let here = room(at);
+        if here < 0.0 {
+            return false;
         }
+        if at >= end {
+            return true;
+        }
+        at = (at + step(here)).min(end);
     }
 }
 

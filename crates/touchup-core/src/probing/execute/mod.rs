@@ -20,10 +20,10 @@ mod world;
 
 pub use cell::Cell;
 pub use cone::{NotReached, Orientation};
-pub use dry_run::{Plan, plan};
+pub use dry_run::{HeldBack, Plan, PlannedMotion, plan};
 pub use ending::{Ending, Probed, ProbedSlide, ProbedTouch};
 pub use links::{LinkError, Tool, free_path, turning_place};
-pub use payload::{PayloadProbeError, PayloadReading, PayloadReadings};
+pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use repeat::{Repeatability, SpotError, SpotTouch};
 pub use tip::TipPoses;

@@ -5,36 +5,22 @@
 //! each orientation, so that a weight that is not known yet is no force to stop for; what is kept is the raw wrench, which no
 //! zero changes.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
 
 use super::cell::Cell;
 use super::cone::{NotReached, Orientation, leaned, rings};
 use super::ending::Ending;
-use super::feature_probing::EarlyEnd;
 use super::links::Tool;
 use super::prober::Prober;
 use super::route::{Route, ToolState, route};
-use crate::probing::arm::{ArmState, Watched};
-use crate::stylus::Wrench;
-
-/// Mean wrench over the dwell in one orientation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PayloadReading {
-    /// Of the flange F in the base B.
-    pub r_bf: UnitQuaternion<f64>,
-    /// Mean of the raw wrench, in F about its origin.
-    pub wrench_f: Wrench,
-    /// Standard deviation of one reading of the force, per axis, N.
-    pub noise: f64,
-    /// Readings in the mean.
-    pub readings: usize,
-}
+use crate::calibrate::{SampleBlock, StaticPose};
+use crate::stylus::Sample;
 
 /// The static segments for payload identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PayloadReadings {
-    /// in their order
-    pub segments: Vec<PayloadReading>,
+    /// in their order: of the flange in the base, the raw wrench in the axes of the flange about its origin
+    pub segments: Vec<StaticPose>,
     /// those that were left out
     pub not_reached: Vec<NotReached>,
 }
@@ -44,7 +30,7 @@ pub struct PayloadReadings {
 pub enum PayloadProbeError {
     /// The arm did not get so far.
     #[error("{0}")]
-    Ended(Ending),
+    Ended(#[from] Ending),
     /// Nothing moved.
     #[error(
         "the arm gets to {reached} of {wanted} orientations, {FEWEST} are needed; {why}. Nothing moved: bring the probe to where the \
@@ -69,59 +55,14 @@ const SETTLE: f64 = 0.3;
 /// The wrench is averaged over this time, s: 500 readings of a UR.
 const AVERAGED: f64 = 1.0;
 
-/// Sums over the states of one dwell.
-#[derive(Default)]
-struct WrenchSums {
-    force: Vector3<f64>,
-    torque: Vector3<f64>,
-    /// Σ |fᵢ − fᵢ₋₁|²
-    squares: f64,
-    last: Option<ArmState>,
-    count: usize,
-}
-
-impl WrenchSums {
-    fn add(&mut self, state: &ArmState) {
-        let Wrench { force, torque } = state.raw_wrench_f;
-        self.force += force;
-        self.torque += torque;
-        let before = self.last.replace(*state).map_or(force, |last| last.raw_wrench_f.force);
-        self.squares += (force - before).norm_squared();
-        self.count += 1;
-    }
-
-    /// From a state to the last one, s.
-    fn seconds_after(&self, state: &ArmState) -> f64 {
-        self.last.map_or(0.0, |last| (last.stamp_ns - state.stamp_ns) as f64 * 1e-9)
-    }
-
-    /// `None` where there are fewer than two states.
-    fn reading(&self, cell: &Cell) -> Option<PayloadReading> {
-        let n = self.count as f64;
-        let last = self.last.filter(|_| self.count > 1)?;
-        Some(PayloadReading {
-            r_bf: last.pose_bt.rotation * cell.pose_ft.rotation.inverse(),
-            wrench_f: Wrench { force: self.force / n, torque: self.torque / n },
-            // a difference of two readings has twice the variance of one, on three axes
-            noise: (self.squares / (6.0 * (n - 1.0))).sqrt(),
-            readings: self.count,
-        })
-    }
-}
-
 impl Prober<'_> {
     /// Measures the wrench of the payload in free air around the pose of the arm, and goes back there.
     ///
     /// # Errors
     /// [`PayloadProbeError`]; the arm is stopped then.
     pub fn measure_payload(&mut self) -> Result<PayloadReadings, PayloadProbeError> {
-        let ended = |broken: EarlyEnd| PayloadProbeError::Ended(broken.into());
-        let state = self.in_free_air().map_err(ended)?;
-        let home = ToolState {
-            place: self.cell.place(&state.pose_bt),
-            rotation: state.pose_bt.rotation,
-            joints: state.joints,
-        };
+        let state = self.in_free_air()?;
+        let home = ToolState::of(self.cell, &state);
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
         let cell = Cell { tool: Tool { shaft_length: length, ..self.cell.tool }, ..self.cell.clone() };
@@ -130,18 +71,17 @@ impl Prober<'_> {
             let why = not_reached.into_iter().next().map_or_else(String::new, |first: NotReached| first.why);
             return Err(PayloadProbeError::TooFew { reached: routes.len(), wanted: orientations().count(), why });
         }
-        let back = route(&cell, &self.params.limits, &*self.world, &last, &home.rotation, &home.place);
-        let back = back.map_err(|barred| ended(barred.into()))?;
+        let back = route(&cell, &self.params.limits, &*self.world, &last, &home.rotation, &home.place)?;
         let mut segments = Vec::new();
         for route in &routes {
-            self.turn_along(route).map_err(ended)?;
-            let sums = self.dwell().map_err(ended)?;
-            if sums.seconds_after(&state) > self.params.limits.time {
-                return Err(PayloadProbeError::Ended(Ending::TimeSpent));
+            self.turn_along(route)?;
+            let Some((segment, ended_ns)) = self.dwell()? else { continue };
+            if (ended_ns - state.stamp_ns) as f64 * 1e-9 > self.params.limits.time {
+                return Err(Ending::TimeSpent.into());
             }
-            segments.extend(sums.reading(&cell));
+            segments.push(segment);
         }
-        self.turn_along(&back).map_err(ended)?;
+        self.turn_along(&back)?;
         Ok(PayloadReadings { segments, not_reached })
     }
 
@@ -156,31 +96,39 @@ impl Prober<'_> {
                     at = ToolState { place, rotation, joints: route.joints };
                     routes.push(route);
                 }
-                Err(barred) => not_reached.push(NotReached { orientation, why: barred.to_string() }),
+                Err(ending) => not_reached.push(NotReached { orientation, why: ending.why() }),
             }
         }
         (routes, not_reached, at)
     }
 
-    fn turn_along(&mut self, route: &Route) -> Result<(), EarlyEnd> {
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        let (touch, most) = (&self.params.touch, self.params.limits.force);
+    fn turn_along(&mut self, route: &Route) -> Result<(), Ending> {
+        let (cell, touch, most) = (self.cell, &self.params.touch, self.params.limits.force);
+        let mut watched = self.watched();
         for (place, rotation) in &route.stops {
-            let pose = self.cell.pose(rotation, place);
+            let pose = cell.pose(rotation, place);
             // a weight that is not known yet loads the sensor as the probe turns
             watched.line("turning in free air", &pose, touch.link_speed, touch, most)?;
         }
         Ok(())
     }
 
-    /// Dwells, averages the wrench, and zeroes the sensor.
-    fn dwell(&mut self) -> Result<WrenchSums, EarlyEnd> {
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
+    /// Dwells, averages the wrench, and zeroes the sensor; what was measured, and when that ended, ns.
+    fn dwell(&mut self) -> Result<Option<(StaticPose, i64)>, Ending> {
+        let r_tf = self.cell.pose_ft.rotation.inverse();
+        let mut watched = self.watched();
         watched.dwell("settling in free air", SETTLE, &mut |_| {})?;
-        let mut sums = WrenchSums::default();
-        watched.dwell("measuring the payload", AVERAGED, &mut |state| sums.add(state))?;
+        let (mut block, mut r_bt) = (None::<SampleBlock>, UnitQuaternion::identity());
+        watched.dwell("measuring the payload", AVERAGED, &mut |state| {
+            let sample = Sample { stamp_ns: state.stamp_ns, pose_ot: state.pose_bt, wrench: state.raw_wrench_f };
+            match &mut block {
+                Some(block) => block.add(&sample),
+                None => block = Some(SampleBlock::of(&sample)),
+            }
+            r_bt = state.pose_bt.rotation;
+        })?;
         watched.zero()?;
-        Ok(sums)
+        Ok(block.map(|block| (StaticPose { r_wt: r_bt * r_tf, ..block.static_pose() }, block.end_ns)))
     }
 }
 
@@ -190,6 +138,8 @@ fn orientations() -> impl Iterator<Item = Orientation> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     #[test]

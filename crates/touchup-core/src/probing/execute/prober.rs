@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit};
 
 use super::cell::Cell;
 use super::ending::{Ending, Probed, ProbedTouch};
-use super::feature_probing::{EarlyEnd, FeatureProbing};
+use super::feature_probing::FeatureProbing;
 use super::links::{LinkError, Tool};
 use super::route::{ToolState, may_touch, route};
 use super::world::{Phase, Progress, World, distance, normal_about, on_mesh};
@@ -90,31 +90,44 @@ impl<'a> Prober<'a> {
     /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has retracted wherever it was still
     /// allowed to move.
     pub fn probe(&mut self, flag: &Flag) -> Probed {
-        let mut explorer = None;
-        let (ended, probing) = self.run(flag, &mut explorer);
-        let found = explorer.as_ref().map(Explorer::found);
-        let ending = match ended {
-            Ok(Some(ending)) => ending,
-            Ok(None) => match &found {
-                Some(Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
-                Some(Ok(_)) => Ending::TouchesSpent,
-                // the search did not end
-                Some(Err(ExploreError::NotDone { .. })) => Ending::TouchesSpent,
-                Some(Err(error)) => Ending::NothingFound(error.clone()),
-                None => Ending::TouchesSpent,
-            },
-            Err(broken) => broken.into(),
+        let (mut explorer, mut probing) = match self.begin(flag) {
+            Ok(begun) => begun,
+            Err(ending) => {
+                let (touches, slides) = (Vec::new(), Vec::new());
+                return Probed { flag: flag.id, ending, found: None, touches, slides, seconds: 0.0, peak_force: 0.0 };
+            }
         };
-        let mut probed = Probed { found: found.and_then(Result::ok), ..Probed::not_begun(flag.id, ending) };
-        if let Some(probing) = probing {
-            probed.seconds = probing.seconds();
-            (probed.touches, probed.slides, probed.peak_force) = (probing.touches, probing.slides, probing.peak_force);
+        let mut ended = self.explore(&mut explorer, &mut probing);
+        if self.params.slides && ended.is_ok() {
+            ended = self.slide_over(explorer.slides(), &mut probing);
         }
-        probed
+        let ended = self.finish(ended, &mut probing);
+        let found = explorer.found();
+        let ending = match (ended, &found) {
+            (Err(ending), _) => ending,
+            (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
+            // not done: the search did not end
+            (Ok(()), Ok(_) | Err(ExploreError::NotDone { .. })) => Ending::TouchesSpent,
+            (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
+        };
+        Probed {
+            flag: flag.id,
+            ending,
+            found: found.ok(),
+            seconds: probing.seconds(),
+            peak_force: probing.peak_force,
+            touches: probing.touches,
+            slides: probing.slides,
+        }
+    }
+
+    /// The arm, watched by all that watches it.
+    pub(super) fn watched(&mut self) -> Watched<'_> {
+        Watched::new(self.arm, self.params.limits.clone(), self.world)
     }
 
     /// Where the arm is, at rest in free air with its sensor zeroed.
-    pub(super) fn in_free_air(&mut self) -> Result<ArmState, EarlyEnd> {
+    pub(super) fn in_free_air(&mut self) -> Result<ArmState, Ending> {
         // zeroing the sensor would remove a force that acts now
         let world = &*self.world;
         let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
@@ -123,31 +136,26 @@ impl<'a> Prober<'a> {
         let (here, bare) = (self.cell.place(&now.pose_bt), Tool { margin: 0.0, ..self.cell.tool });
         if bare.room(&here, &self.cell.shaft(&now.pose_bt.rotation), &clear, 0.0) < 0.0 {
             let place_mm = (here * 1e3).coords.into();
-            return Err(EarlyEnd::Link(LinkError::InPart { place_mm }));
+            return Err(LinkError::InPart { place_mm }.into());
         }
         // in free air, where it is stopped: the first link is watched by the force as well
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        watched.zero()?;
+        self.watched().zero()?;
         Ok(self.arm.next_state().map_err(arm)?)
     }
 
     /// The explorer and where the arm is, when both can begin.
-    pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing), EarlyEnd> {
+    pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing), Ending> {
         let state = self.in_free_air()?;
         let shaft_now = self.cell.shaft(&state.pose_bt.rotation);
         let place = on_mesh(self.world, &flag.place);
         let normal = normal_about(self.world, &place, &shaft_now);
         let rotation = self.cell.upright(&state.pose_bt.rotation, &normal);
         let pattern = PatternParams { flag_radius: flag.radius, ..self.params.pattern };
-        let explorer = Explorer::new(flag.kind, &place, &normal, pattern).map_err(EarlyEnd::Explore)?;
+        let explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
         let probing = FeatureProbing {
             flag: flag.id,
             rotation,
-            out: ToolState {
-                place: self.cell.place(&state.pose_bt),
-                rotation: state.pose_bt.rotation,
-                joints: state.joints,
-            },
+            out: ToolState::of(self.cell, &state),
             is_out: true,
             entry: None,
             from: None,
@@ -160,37 +168,20 @@ impl<'a> Prober<'a> {
         Ok((explorer, probing))
     }
 
-    fn run(
-        &mut self,
-        flag: &Flag,
-        kept: &mut Option<Explorer>,
-    ) -> (Result<Option<Ending>, EarlyEnd>, Option<FeatureProbing>) {
-        let (explorer, mut probing) = match self.begin(flag) {
-            Ok(begun) => begun,
-            Err(broken) => return (Err(broken), None),
-        };
-        let explorer = kept.insert(explorer);
-        let mut ended = self.explore(explorer, &mut probing);
-        if self.params.slides && matches!(ended, Ok(None)) {
-            ended = self.slide_over(explorer.slides(), &mut probing).map(|()| None);
-        }
-        (self.finish(ended, &mut probing), Some(probing))
-    }
-
     /// Retracts, wherever the arm is allowed to move.
-    pub(super) fn finish<T>(
-        &mut self,
-        ended: Result<T, EarlyEnd>,
-        probing: &mut FeatureProbing,
-    ) -> Result<T, EarlyEnd> {
-        let retracted = if is_movable(&ended) { self.retract(probing) } else { Ok(()) };
+    pub(super) fn finish<T>(&mut self, ended: Result<T, Ending>, probing: &mut FeatureProbing) -> Result<T, Ending> {
+        use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
+        // a failed retraction outranks these
+        let is_unbroken = matches!(ended, Ok(_) | Err(Cancelled | TimeSpent));
+        let may_move =
+            is_unbroken || matches!(ended, Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. })));
+        let retracted = if may_move { self.retract(probing) } else { Ok(()) };
         // where nothing comes any more it ended when it was seen last
         probing.ended_ns = self.arm.next_state().map_or(probing.ended_ns, |state| state.stamp_ns.max(probing.ended_ns));
-        match (ended, retracted) {
-            // a failed retraction outranks a cancellation
-            (Ok(_) | Err(EarlyEnd::Arm(ProbeError::Cancelled { .. })), Err(error)) => Err(error.into()),
+        match retracted {
+            Err(error) if is_unbroken => Err(error.into()),
             // the first error is the one to report
-            (ended, _) => ended,
+            _ => ended,
         }
     }
 
@@ -199,52 +190,40 @@ impl<'a> Prober<'a> {
         &mut self,
         planned: &TouchPlan,
         probing: &mut FeatureProbing,
-    ) -> Result<ProbedTouch, EarlyEnd> {
-        let joints = may_touch(self.cell, &self.params.limits, &probing.rotation, planned, &probing.out.joints);
-        probing.out.joints = joints.map_err(EarlyEnd::Limit)?;
+    ) -> Result<ProbedTouch, Ending> {
         // zeroed again for each, as another touch has nothing to do with it
-        self.go(planned, probing, &mut false)?;
-        let (_, touched) = self.touch(planned, probing)?;
+        let (_, touched) = self.go_and_touch(planned, probing, &mut false)?;
         self.retract(probing)?;
         Ok(touched)
     }
 
-    fn explore(&mut self, explorer: &mut Explorer, probing: &mut FeatureProbing) -> Result<Option<Ending>, EarlyEnd> {
+    fn explore(&mut self, explorer: &mut Explorer, probing: &mut FeatureProbing) -> Result<(), Ending> {
         let mut is_zeroed = false;
         while let Some(planned) = explorer.next_touch() {
             if probing.seconds() > self.params.limits.time {
-                return Ok(Some(Ending::TimeSpent));
+                return Err(Ending::TimeSpent);
             }
             self.publish(explorer, probing, explorer.touches() + 1);
-            match may_touch(self.cell, &self.params.limits, &probing.rotation, &planned, &probing.out.joints) {
-                Ok(joints) => probing.out.joints = joints,
+            let (result, touch) = match self.go_and_touch(&planned, probing, &mut is_zeroed) {
+                Ok(touched) => touched,
                 // the first one is where the feature is
-                Err(error) if probing.touches.is_empty() => return Err(EarlyEnd::Limit(error)),
-                Err(error) => {
-                    explorer.take(&TouchResult::Unclear);
-                    probing.touches.push(held_back(planned, error.to_string()));
-                    continue;
+                Err(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_))) if probing.touches.is_empty() => {
+                    return Err(ending);
                 }
-            }
-            let touched = self.go(&planned, probing, &mut is_zeroed).and_then(|()| self.touch(&planned, probing));
-            let (result, touch) = match touched {
-                Ok((result, touch)) => (result, touch),
-                Err(EarlyEnd::Arm(error @ ProbeError::Obstacle { is_link: false, .. })) => {
-                    (TouchResult::Unclear, held_back(planned, error.to_string()))
+                Err(ending) if ending.is_of_one() => {
+                    let refused = Some(ending.why());
+                    (
+                        TouchResult::Unclear,
+                        ProbedTouch { planned, record: None, centre: None, deviation: None, refused },
+                    )
                 }
-                Err(EarlyEnd::Link(error)) if !probing.touches.is_empty() => {
-                    (TouchResult::Unclear, held_back(planned, error.to_string()))
-                }
-                Err(EarlyEnd::Limit(error)) if !probing.touches.is_empty() => {
-                    (TouchResult::Unclear, held_back(planned, error.to_string()))
-                }
-                Err(error) => return Err(error),
+                Err(ending) => return Err(ending),
             };
             explorer.take(&result);
             probing.touches.push(touch);
         }
         self.publish(explorer, probing, explorer.touches());
-        Ok(None)
+        Ok(())
     }
 
     fn publish(&mut self, explorer: &Explorer, probing: &FeatureProbing, touch: usize) {
@@ -263,34 +242,42 @@ impl<'a> Prober<'a> {
         to: &Isometry3<f64>,
         probing: &mut FeatureProbing,
         guard: LineGuard,
-    ) -> Result<(), EarlyEnd> {
-        let TouchParams { link_speed, trigger, .. } = self.params.touch;
+    ) -> Result<(), Ending> {
+        let ProbeParams { touch, limits, .. } = self.params;
         let (speed, trigger) = match guard {
-            LineGuard::Link => (link_speed, LINK_TRIGGER * trigger),
-            LineGuard::Slow => (self.params.touch.safe_speed(), trigger),
+            LineGuard::Link => (touch.link_speed, LINK_TRIGGER * touch.trigger),
+            LineGuard::Slow => (touch.safe_speed(), touch.trigger),
             // the part may be in contact
-            LineGuard::Retract => (link_speed, self.params.limits.force),
+            LineGuard::Retract => (touch.link_speed, limits.force),
         };
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        let moved = watched.line(doing, to, speed, &self.params.touch, trigger);
+        let mut watched = self.watched();
+        let moved = watched.line(doing, to, speed, touch, trigger);
         probing.keep(&watched);
         // however slow a link is, nothing should be there
         moved.map_err(|error| match (error, guard) {
             (ProbeError::Obstacle { doing, force_n, place_mm, .. }, LineGuard::Link) => {
-                EarlyEnd::Arm(ProbeError::Obstacle { doing, force_n, place_mm, is_link: true })
+                ProbeError::Obstacle { doing, force_n, place_mm, is_link: true }.into()
             }
-            (error, _) => EarlyEnd::Arm(error),
+            (error, _) => error.into(),
         })
     }
 
-    /// Brings the ball to where a touch is entered from.
-    fn go(&mut self, planned: &TouchPlan, probing: &mut FeatureProbing, is_zeroed: &mut bool) -> Result<(), EarlyEnd> {
+    /// Brings the ball to where a touch is entered from, and touches.
+    fn go_and_touch(
+        &mut self,
+        planned: &TouchPlan,
+        probing: &mut FeatureProbing,
+        is_zeroed: &mut bool,
+    ) -> Result<(TouchResult, ProbedTouch), Ending> {
+        let joints = may_touch(self.cell, &self.params.limits, &probing.rotation, planned, &probing.out.joints);
+        probing.out.joints = joints?;
         let near = INSIDE * self.params.pattern.ball_radius;
-        if probing.from.is_some_and(|from| (from - planned.from).norm() < near) && planned.from != planned.entry {
-            // stays inside of the feature
-            return Ok(());
+        let is_near = probing.from.is_some_and(|from| (from - planned.from).norm() < near);
+        // else it stays inside of the feature
+        if !is_near || planned.from == planned.entry {
+            self.reach(&planned.entry, probing, is_zeroed)?;
         }
-        self.reach(&planned.entry, probing, is_zeroed)
+        self.touch(planned, probing)
     }
 
     /// Out of the feature, and through free air to a place above it.
@@ -299,7 +286,7 @@ impl<'a> Prober<'a> {
         above: &Point3<f64>,
         probing: &mut FeatureProbing,
         is_zeroed: &mut bool,
-    ) -> Result<(), EarlyEnd> {
+    ) -> Result<(), Ending> {
         self.world.enter(Phase::Link);
         while let Some(place) = probing.next_out() {
             let pose = self.cell.pose(&probing.rotation, &place);
@@ -316,8 +303,7 @@ impl<'a> Prober<'a> {
         if !*is_zeroed {
             // again where it is touched: turning the wrist loads its sensor
             self.world.enter(Phase::Zeroing);
-            let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-            watched.zero()?;
+            self.watched().zero()?;
             *is_zeroed = true;
         }
         probing.is_out = false;
@@ -334,7 +320,7 @@ impl<'a> Prober<'a> {
         &mut self,
         planned: &TouchPlan,
         probing: &mut FeatureProbing,
-    ) -> Result<(TouchResult, ProbedTouch), EarlyEnd> {
+    ) -> Result<(TouchResult, ProbedTouch), Ending> {
         let target = TouchTarget {
             standoff_bt: self.cell.pose(&probing.rotation, &planned.from),
             direction: Unit::new_normalize(self.cell.pose_bo.rotation * planned.direction.into_inner()),
@@ -343,8 +329,9 @@ impl<'a> Prober<'a> {
         };
         let before = Before::of(self.world, planned, self.params.pattern.ball_radius);
         self.world.enter(Phase::Search);
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        let touched = watched.touch(&target, &self.params.touch);
+        let touch = &self.params.touch;
+        let mut watched = self.watched();
+        let touched = watched.touch(&target, touch);
         probing.keep(&watched);
         // where the ball has not been it does not go on the retraction
         if touched.as_ref().map_or_else(ProbeError::was_at_standoff, |_| true) {
@@ -440,18 +427,3 @@ enum LineGuard {
 const LINK_TRIGGER: f64 = 1.5;
 /// The mesh is searched this far from a contact, m.
 const DEVIATION_REACH: f64 = 20e-3;
-
-fn held_back(planned: TouchPlan, refused: String) -> ProbedTouch {
-    ProbedTouch { planned, record: None, centre: None, deviation: None, refused: Some(refused) }
-}
-
-/// Whether the arm is allowed to move.
-fn is_movable<T>(ended: &Result<T, EarlyEnd>) -> bool {
-    matches!(
-        ended,
-        Ok(_)
-            | Err(EarlyEnd::Link(_)
-                | EarlyEnd::Limit(_)
-                | EarlyEnd::Arm(ProbeError::Cancelled { .. } | ProbeError::TooLong { .. }))
-    )
-}

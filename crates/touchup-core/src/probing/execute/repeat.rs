@@ -2,12 +2,13 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::ending::Ending;
+use super::ending::{Ending, ProbedTouch};
+use super::feature_probing::FeatureProbing;
 use super::prober::{Flag, Prober};
 use super::world::{normal_about, on_mesh};
 use crate::features::Kind;
 use crate::numeric::tangent_basis;
-use crate::probing::arm::{OnsetVerdict, TouchOutcome};
+use crate::probing::arm::{Onset, OnsetVerdict, TouchOutcome};
 use crate::probing::plan::TouchPlan;
 
 /// One touch of the spot.
@@ -41,7 +42,7 @@ pub struct Repeatability {
 pub enum SpotError {
     /// The arm did not get so far.
     #[error("{0}")]
-    Ended(Ending),
+    Ended(#[from] Ending),
     /// One of the touches made no contact, or none that can be used.
     #[error("touch {touch} of the spot: {why}")]
     NoContact {
@@ -66,46 +67,65 @@ impl Prober<'_> {
     /// # Errors
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
-        let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
-        let (_, mut probing) = self.begin(&flag).map_err(|broken| SpotError::Ended(broken.into()))?;
-        let place = on_mesh(self.world, spot);
-        let normal = normal_about(self.world, &place, &self.cell.shaft(&probing.rotation));
-        let across = tangent_basis(&normal)[0];
-        let from = place + normal.into_inner() * (self.params.pattern.ball_radius + STANDOFF);
-        let (mut touches, mut failed) = (Vec::with_capacity(count), None);
-        let mut touch_all = || {
+        self.at_spot(spot, |prober, place, normal, probing| {
+            let across = tangent_basis(&normal)[0];
+            let from = place + normal.into_inner() * (prober.params.pattern.ball_radius + STANDOFF);
+            let mut touches = Vec::with_capacity(count);
             for touch in 1..=count {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
                 let aside = across * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
                 let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
-                if probing.seconds() > self.params.limits.time {
-                    failed = Some(SpotError::Ended(Ending::TimeSpent));
-                    break;
-                }
-                let probed = self.touch_and_retract(&planned, &mut probing)?;
-                let outcome = probed.record.as_ref().map(|record| &record.outcome);
-                match (outcome, probed.centre, &probed.refused) {
-                    (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => touches.push(SpotTouch {
-                        side,
-                        height: centre.coords.dot(&normal),
-                        sigma: onset.sigma,
-                        stiffness: [onset.stiffness, onset.stiffness_sigma],
-                        verdict: onset.verdict,
-                    }),
-                    (_, _, why) => {
-                        let why = why.clone().unwrap_or_else(|| "nothing is there".to_owned());
-                        failed = Some(SpotError::NoContact { touch, why });
-                        break;
-                    }
-                }
+                let (onset, centre) = prober.touch_spot(&planned, touch, probing)?;
+                touches.push(SpotTouch {
+                    side,
+                    height: centre.coords.dot(&normal),
+                    sigma: onset.sigma,
+                    stiffness: [onset.stiffness, onset.stiffness_sigma],
+                    verdict: onset.verdict,
+                });
             }
-            Ok(())
+            Ok(Repeatability { touches, place, normal })
+        })
+    }
+
+    /// Begins at a spot, makes all its touches, and retracts.
+    ///
+    /// - `touch_all`: with the place of the spot on the mesh and its normal.
+    pub(super) fn at_spot<T>(
+        &mut self,
+        spot: &Point3<f64>,
+        touch_all: impl FnOnce(&mut Self, Point3<f64>, Unit<Vector3<f64>>, &mut FeatureProbing) -> Result<T, SpotError>,
+    ) -> Result<T, SpotError> {
+        let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
+        let (_, mut probing) = self.begin(&flag)?;
+        let place = on_mesh(self.world, spot);
+        let normal = normal_about(self.world, &place, &self.cell.shaft(&probing.rotation));
+        let ended = match touch_all(self, place, normal, &mut probing) {
+            Err(SpotError::Ended(ending)) => Err(ending),
+            touched => Ok(touched),
         };
-        let ended = touch_all();
-        match self.finish(ended, &mut probing) {
-            Err(broken) => Err(SpotError::Ended(broken.into())),
-            Ok(()) => failed.map_or(Ok(Repeatability { touches, place, normal }), Err),
+        self.finish(ended, &mut probing)?
+    }
+
+    /// One touch of a spot, and the centre of the ball then.
+    ///
+    /// - `touch`: its number, from 1 on.
+    pub(super) fn touch_spot(
+        &mut self,
+        planned: &TouchPlan,
+        touch: usize,
+        probing: &mut FeatureProbing,
+    ) -> Result<(Onset, Point3<f64>), SpotError> {
+        if probing.seconds() > self.params.limits.time {
+            return Err(Ending::TimeSpent.into());
+        }
+        let ProbedTouch { record, centre, refused, .. } = self.touch_and_retract(planned, probing)?;
+        match (record.map(|record| record.outcome), centre, refused) {
+            (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => Ok((onset, centre)),
+            (_, _, why) => {
+                Err(SpotError::NoContact { touch, why: why.unwrap_or_else(|| "nothing is there".to_owned()) })
+            }
         }
     }
 }

@@ -3,19 +3,11 @@
 use nalgebra::{Point3, UnitQuaternion};
 
 use super::cell::Cell;
-use super::links::{LinkError, clear_entry, free_path, turning_place};
+use super::ending::Ending;
+use super::links::{clear_entry, free_path, turning_place};
 use super::world::{World, distance, highest};
-use crate::probing::arm::{Joints, LimitError, Limits};
+use crate::probing::arm::{ArmState, Joints, LimitError, Limits};
 use crate::probing::plan::{Slide, TouchPlan};
-
-/// Why the tool does not get there.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub(super) enum Barred {
-    #[error(transparent)]
-    Limit(#[from] LimitError),
-    #[error(transparent)]
-    Link(#[from] LinkError),
-}
 
 /// Where the tool is, in free air.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +17,12 @@ pub(super) struct ToolState {
     /// of the tip in B
     pub rotation: UnitQuaternion<f64>,
     pub joints: Joints,
+}
+
+impl ToolState {
+    pub fn of(cell: &Cell, state: &ArmState) -> Self {
+        Self { place: cell.place(&state.pose_bt), rotation: state.pose_bt.rotation, joints: state.joints }
+    }
 }
 
 /// A path through free air.
@@ -78,6 +76,9 @@ pub(super) fn may_slide(
 }
 
 /// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
+///
+/// # Errors
+/// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
 pub(super) fn route(
     cell: &Cell,
     limits: &Limits,
@@ -85,7 +86,7 @@ pub(super) fn route(
     at: &ToolState,
     rotation: &UnitQuaternion<f64>,
     entry: &Point3<f64>,
-) -> Result<Route, Barred> {
+) -> Result<Route, Ending> {
     let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
     let (tool, shaft) = (&cell.tool, cell.shaft(rotation));
     let mut route = Route { stops: Vec::new(), joints: at.joints };

@@ -2,45 +2,38 @@
 
 use nalgebra::Unit;
 
-use super::ending::ProbedSlide;
-use super::feature_probing::{EarlyEnd, FeatureProbing};
+use super::ending::{Ending, ProbedSlide};
+use super::feature_probing::FeatureProbing;
 use super::links::clear_entry;
 use super::prober::Prober;
 use super::route::may_slide;
 use super::world::{Phase, distance};
-use crate::probing::arm::{ProbeError, SlideStation, SlideTarget, Watched};
-use crate::probing::plan::Slide;
+use crate::probing::arm::{SlideStation, SlideTarget};
+use crate::probing::plan::{Slide, Station};
 
 impl Prober<'_> {
     /// Slides along each path in turn, as long as there is time. What cannot be slid over is recorded with its reason.
-    pub(super) fn slide_over(&mut self, slides: Vec<Slide>, probing: &mut FeatureProbing) -> Result<(), EarlyEnd> {
+    pub(super) fn slide_over(&mut self, slides: Vec<Slide>, probing: &mut FeatureProbing) -> Result<(), Ending> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide { slide: slide.clone(), record: None, refused: Some(why) };
             if probing.seconds() > self.params.limits.time {
                 probing.slides.push(held_back("the time is spent".to_owned()));
                 continue;
             }
-            if let Err(error) =
-                may_slide(self.cell, &self.params.limits, &probing.rotation, &slide, &probing.out.joints)
-            {
-                probing.slides.push(held_back(error.to_string()));
-                continue;
-            }
             let slid = self.slide(&slide, probing);
             probing.slides.push(match slid {
                 Ok(probed) => probed,
-                Err(EarlyEnd::Link(error)) => held_back(error.to_string()),
-                Err(EarlyEnd::Limit(error)) => held_back(error.to_string()),
-                Err(EarlyEnd::Arm(error @ ProbeError::Obstacle { is_link: false, .. })) => held_back(error.to_string()),
-                Err(error) => return Err(error),
+                Err(ending) if ending.is_of_one() => held_back(ending.why()),
+                Err(ending) => return Err(ending),
             });
         }
         Ok(())
     }
 
-    fn slide(&mut self, slide: &Slide, probing: &mut FeatureProbing) -> Result<ProbedSlide, EarlyEnd> {
+    fn slide(&mut self, slide: &Slide, probing: &mut FeatureProbing) -> Result<ProbedSlide, Ending> {
+        may_slide(self.cell, &self.params.limits, &probing.rotation, slide, &probing.out.joints)?;
         self.reach(&slide.above(0), probing, &mut true)?;
-        let in_b = |station: &crate::probing::plan::Station| SlideStation {
+        let in_b = |station: &Station| SlideStation {
             place: (self.cell.pose_bo * station.centre).coords,
             normal: Unit::new_normalize(self.cell.pose_bo.rotation * station.normal.into_inner()),
         };
@@ -52,8 +45,9 @@ impl Prober<'_> {
         };
         self.world.enter(Phase::Slide);
         let mut reached = None;
-        let mut watched = Watched::new(self.arm, self.params.limits.clone(), self.world);
-        let slid = watched.slide(&target, &self.params.touch, &mut reached);
+        let touch = &self.params.touch;
+        let mut watched = self.watched();
+        let slid = watched.slide(&target, touch, &mut reached);
         probing.keep(&watched);
         if let Some(station) = reached {
             self.leave_from(slide, station, probing);
