@@ -2,7 +2,8 @@
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideStation, SlideTarget, TouchParams, Watched};
+use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideTarget, TouchParams, Watched};
+use touchup::probing::plan::Station;
 use touchup::sim::ArmParams;
 
 use crate::stand_in::{StandIn, limits};
@@ -54,7 +55,7 @@ fn a_slide_goes_over_a_rim() {
             let normal = Vector3::new(angle.sin(), 0.0, angle.cos());
             let centre = Point3::new(x, 8e-3, z) + normal * ball;
             let normal = Unit::new_normalize(pose_bo.rotation * normal);
-            SlideStation { place: (pose_bo * centre).coords, normal }
+            Station { centre: pose_bo * centre, normal }
         };
         let share = |at: u32, count: u32| f64::from(at) / f64::from(count);
         let top = (0..=80).map(|at| station(52e-3 + 8e-3 * share(at, 80), TOP, 0.0));

@@ -181,6 +181,8 @@ pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<Paylo
         return Err(PayloadError::TooFew { count: poses.len() });
     }
     let forces = equations(poses, params);
+    let too_alike =
+        |least: Undetermined| PayloadError::TooAlike { tilt_deg: least.angle().to_degrees(), axis: least.axis.into() };
     let force = fit(&forces, SMALLEST_SPREAD).map_err(too_alike)?;
     check_axes(poses, params, &force)?;
     if force.rejected() as f64 > LARGEST_REJECTED * poses.len() as f64 {
@@ -193,15 +195,15 @@ pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<Paylo
     if !(weight > 3.0 * sigma && weight > f64::MIN_POSITIVE) {
         return Err(PayloadError::NoWeight { weight_n: weight, sigma_n: sigma });
     }
-    let (torque, covariance_p, covariance_b) = fit_torque(poses, params, &force)?;
+    let torque = fit_torque(poses, params, &force)?;
     let variance = |pose: &StaticPose| pose.noise.map(|noise| 3.0 * noise * noise / pose.samples as f64);
     let expected: Option<f64> = poses.iter().map(variance).sum();
     Ok(PayloadFit {
         weight: [weight, sigma],
         weight_w: VectorEstimate::new(force.x, &force.covariance_x),
-        p_sc: VectorEstimate::new(torque.x, &covariance_p),
+        p_sc: VectorEstimate::new(torque.x, &torque.covariance_x),
         bias_force: VectorEstimate::new(force.y, &force.covariance_y),
-        bias_torque: VectorEstimate::new(torque.y, &covariance_b),
+        bias_torque: VectorEstimate::new(torque.y, &torque.covariance_y),
         rms_force: force.rms,
         rms_torque: torque.rms,
         expected_force: expected.map(|sum| (sum / poses.len() as f64).sqrt()),
@@ -233,7 +235,7 @@ fn fit_torque(
     poses: &[StaticPose],
     params: &PayloadParams,
     force: &CalibrationFit,
-) -> Result<(CalibrationFit, Matrix3<f64>, Matrix3<f64>), PayloadError> {
+) -> Result<CalibrationFit, PayloadError> {
     let kept = || poses.iter().zip(&force.kept).filter(|(_, kept)| **kept).map(|(pose, _)| pose);
     let torques = |weight: &Vector3<f64>| -> Vec<Equation> {
         let equation = |pose: &StaticPose| {
@@ -245,7 +247,7 @@ fn fit_torque(
     let smallest = SMALLEST_CENTRE_SPREAD * force.x.norm_squared();
     let equations = torques(&force.x);
     let undetermined = |least: Undetermined| PayloadError::CentreUndetermined { axis: least.axis.into() };
-    let found = fit(&equations, smallest).map_err(undetermined)?;
+    let mut found = fit(&equations, smallest).map_err(undetermined)?;
     // a step as large as the uncertainty of w: the change is nearly linear over it
     let step = force.covariance_x.trace().sqrt().max(1e-6 * force.x.norm());
     let (mut by_p, mut by_b) = (Matrix3::zeros(), Matrix3::zeros());
@@ -257,12 +259,9 @@ fn fit_torque(
         by_b.set_column(axis, &((moved.y - found.y) / step));
     }
     let carried = |by: Matrix3<f64>| by * force.covariance_x * by.transpose();
-    let (covariance_p, covariance_b) = (found.covariance_x + carried(by_p), found.covariance_y + carried(by_b));
-    Ok((found, covariance_p, covariance_b))
-}
-
-fn too_alike(least: Undetermined) -> PayloadError {
-    PayloadError::TooAlike { tilt_deg: least.angle().to_degrees(), axis: least.axis.into() }
+    found.covariance_x += carried(by_p);
+    found.covariance_y += carried(by_b);
+    Ok(found)
 }
 
 /// Refuses axes when the other ones fit far better.

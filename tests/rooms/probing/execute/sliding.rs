@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
-    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideStation, SlideTarget, TouchParams, Watched,
+    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, TouchParams, Watched,
 };
 use touchup::probing::execute::{Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan};
-use touchup::probing::plan::Slide;
+use touchup::probing::plan::{Slide, Station};
 use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
 
 use super::cell;
@@ -121,7 +121,7 @@ fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>,
         let share = f64::from(at) / 200.0;
         let place = [0, 1].map(|i| from[i] + (to[i] - from[i]) * share);
         let centre = Point3::new(place[0], place[1], TOP + BALL + height);
-        SlideStation { place: (cell.pose_bo * centre).coords, normal: Vector3::z_axis() }
+        Station { centre: cell.pose_bo * centre, normal: Vector3::z_axis() }
     });
     let rotation = UnitQuaternion::identity();
     let target = SlideTarget { rotation, stations: stations.collect(), lift: 3e-3, give: BALL };

@@ -26,16 +26,20 @@ pub struct ArmState {
 }
 
 /// What the safety system of an arm says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, thiserror::Error)]
 pub enum Safety {
     /// It may move.
     #[default]
+    #[error("nothing stops it")]
     Normal,
     /// It stopped by itself: force, speed or a plane.
+    #[error("protective stop (force, speed or a safety plane): look, then recover")]
     ProtectiveStop,
     /// The emergency stop button was pressed, or a door opened.
+    #[error("stopped by the operator (button or door): release it, then recover")]
     OperatorStop,
     /// A fault that takes more than a call to be cleared.
+    #[error("its controller reports a fault: look at its panel")]
     Fault,
 }
 
@@ -119,17 +123,6 @@ pub enum ArmError {
         /// why
         reason: String,
     },
-}
-
-impl std::fmt::Display for Safety {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Normal => "nothing stops it",
-            Self::ProtectiveStop => "protective stop (force, speed or a safety plane): look, then recover",
-            Self::OperatorStop => "stopped by the operator (button or door): release it, then recover",
-            Self::Fault => "its controller reports a fault: look at its panel",
-        })
-    }
 }
 
 /// An arm that holds a probe.

@@ -17,7 +17,7 @@ pub use interface::{Arm, ArmError, ArmState, Command, Safety};
 pub use kinematics::{Joints, UrGeometry};
 pub use limits::{LimitError, Limits, Narrower};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
-pub use sliding::{SlideEnding, SlideRecord, SlideStation, SlideTarget};
+pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
 pub use touch_params::{CRAWL, TouchParams};
 pub use touching::{TouchOutcome, TouchRecord, TouchTarget};
 pub use watched::{Observer, ProbeError, Watched};

@@ -202,10 +202,8 @@ fn check(moments: &[TouchMoment]) -> Result<(), OnsetError> {
         let is_number = [m.t, m.travel, m.force, m.lateral].iter().all(|x| x.is_finite());
         !is_number || index > 0 && m.t <= moments[index - 1].t
     };
-    match (0..moments.len()).find(|&index| is_bad(index)) {
-        Some(index) => Err(OnsetError::BadMoment { index }),
-        None => Ok(()),
-    }
+    let bad = (0..moments.len()).find(|&index| is_bad(index));
+    bad.map_or(Ok(()), |index| Err(OnsetError::BadMoment { index }))
 }
 
 /// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a line through more of them. A
@@ -319,31 +317,33 @@ impl ForceCurve<'_> {
         (peak - free) / (deepest - start).max(REST)
     }
 
-    /// Residual, its derivatives by the unknowns, and its variance.
-    fn residual(&self, m: &TouchMoment, line: &LineFit) -> (f64, LineFit, f64) {
+    /// Residual, its derivatives by the unknowns, and whether it is in free air, 0, or pressing, 1.
+    fn residual(&self, m: &TouchMoment, line: &LineFit) -> (f64, LineFit, usize) {
         let (travel, speed) = self.travel(m.t - line[TAU]);
         let depth = (travel - line[S0]).max(0.0);
         let is_in = usize::from(depth > 0.0);
         let slope = -line[K] * is_in as f64;
-        (m.force - line[B] - line[K] * depth, LineFit::new(slope, slope * speed, 1.0, depth), self.noise[is_in].powi(2))
+        (m.force - line[B] - line[K] * depth, LineFit::new(slope, slope * speed, 1.0, depth), is_in)
     }
 
     /// Sum of squared residuals over their variances, with what is believed of τ.
     fn cost(&self, line: &LineFit) -> f64 {
         let of = |m: &TouchMoment| {
-            let (residual, _, variance) = self.residual(m, line);
-            residual * residual / variance
+            let (residual, _, is_in) = self.residual(m, line);
+            residual * residual / self.noise[is_in].powi(2)
         };
         let believed = (line[TAU] - self.params.delay) / self.params.delay_sigma;
         self.moments.iter().map(of).sum::<f64>() + believed * believed
     }
 
-    /// Of a small change of the line, as [`Self::cost`] weights the moments.
-    fn normal_equations(&self, line: &LineFit) -> NormalEquations<4> {
+    /// Of a small change of the line.
+    ///
+    /// - `noise`: that weights the moments, N in free air and while pressing.
+    fn normal_equations(&self, line: &LineFit, noise: [f64; 2]) -> NormalEquations<4> {
         let mut equations = NormalEquations::default();
         for m in self.moments {
-            let (residual, gradient, variance) = self.residual(m, line);
-            equations.add(&gradient, residual, 1.0 / variance);
+            let (residual, gradient, is_in) = self.residual(m, line);
+            equations.add(&gradient, residual, 1.0 / noise[is_in].powi(2));
         }
         equations
     }
@@ -352,7 +352,7 @@ impl ForceCurve<'_> {
     fn fit(&self, line: LineFit) -> Option<(LineFit, f64)> {
         let believed = self.params.delay_sigma.powi(-2);
         let equations = |line: &LineFit, damping: f64| {
-            let mut equations = self.normal_equations(line);
+            let mut equations = self.normal_equations(line, self.noise);
             equations.add(&LineFit::ith(TAU, 1.0), self.params.delay - line[TAU], believed);
             equations.damped(damping)
         };
@@ -369,8 +369,8 @@ impl ForceCurve<'_> {
     fn residuals(&self, line: &LineFit) -> [Vec<f64>; 2] {
         let mut found = [Vec::new(), Vec::new()];
         for m in self.moments {
-            let (residual, gradient, _) = self.residual(m, line);
-            found[usize::from(gradient[S0] != 0.0)].push(residual);
+            let (residual, _, is_in) = self.residual(m, line);
+            found[is_in].push(residual);
         }
         found
     }
@@ -390,20 +390,14 @@ impl ForceCurve<'_> {
         // what the noise of the travel adds while it presses is shared over the smoothing
         let by_travel = ((all - alone) / all).max(0.0);
         let shared = [shared(&free), shared(&pressing).max(1.0 + by_travel * (SMOOTHED - 1.0))];
-        let reweighted = ForceCurve {
-            path: self.path.clone(),
-            noise: [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at])),
-            ..*self
-        };
-        let mut square = reweighted.normal_equations(line).information;
+        let noise = [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at]));
+        let mut square = self.normal_equations(line, noise).information;
         // of the information on τ, some is noise of the speed
         let travel_variance = self.travel_variance();
-        let noisy: f64 = (0..self.moments.len())
-            .filter(|&at| reweighted.residual(&self.moments[at], line).1[S0] != 0.0)
-            .map(|at| self.path[at].speed_variance * travel_variance)
-            .sum();
+        let pressing = self.moments.iter().zip(&self.path).filter(|(m, _)| self.residual(m, line).2 == 1);
+        let noisy: f64 = pressing.map(|(_, smooth)| smooth.speed_variance * travel_variance).sum();
         let information = square[(TAU, TAU)];
-        square[(TAU, TAU)] += self.params.delay_sigma.powi(-2) - noisy * (line[K] / reweighted.noise[1]).powi(2);
+        square[(TAU, TAU)] += self.params.delay_sigma.powi(-2) - noisy * (line[K] / noise[1]).powi(2);
         let corrected = Cholesky::new(square).map(|square| square.inverse());
         corrected.or_else(|| {
             square[(TAU, TAU)] = information + self.params.delay_sigma.powi(-2);
@@ -494,7 +488,7 @@ impl ForceCurve<'_> {
         let peak = self.moments.iter().map(|m| m.force - line[B]).fold(0.0, f64::max);
         let (into, out) = self.moments.split_at(self.deepest());
         let mean = |of: &[TouchMoment]| {
-            let pressing = of.iter().map(|m| self.residual(m, line)).filter(|(_, gradient, _)| gradient[S0] != 0.0);
+            let pressing = of.iter().map(|m| self.residual(m, line)).filter(|(.., is_in)| *is_in == 1);
             let residuals: Vec<f64> = pressing.map(|(residual, ..)| residual).collect();
             let count = residuals.len() as f64;
             (residuals.len() >= LEAST).then(|| (residuals.iter().sum::<f64>() / count, count))

@@ -8,15 +8,7 @@ use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use super::interface::{ArmState, Command};
 use super::touch_params::TouchParams;
 use super::watched::{ProbeError, TRIGGERS, Watched};
-
-/// A station of the path, in B.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlideStation {
-    /// of the ball's centre, where it touches without pressing, m
-    pub place: Vector3<f64>,
-    /// out of the part
-    pub normal: Unit<Vector3<f64>>,
-}
+use crate::probing::plan::Station;
 
 /// A planned slide, in B.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +16,7 @@ pub struct SlideTarget {
     /// of the tip
     pub rotation: UnitQuaternion<f64>,
     /// in their order, two at least
-    pub stations: Vec<SlideStation>,
+    pub stations: Vec<Station>,
     /// the ball is clear when it is so far from a station along its normal, m
     pub lift: f64,
     /// the surface may be so far from where it was thought, m
@@ -33,33 +25,26 @@ pub struct SlideTarget {
 
 impl SlideTarget {
     fn lifted(&self, station: usize) -> Isometry3<f64> {
-        let SlideStation { place, normal } = self.stations[station];
-        Isometry3::from_parts((place + normal.into_inner() * self.lift).into(), self.rotation)
+        let Station { centre, normal } = self.stations[station];
+        Isometry3::from_parts((centre + normal.into_inner() * self.lift).into(), self.rotation)
     }
 }
 
 /// How a slide ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SlideEnding {
     /// at the last station
+    #[error("arrived")]
     Arrived,
     /// no contact at the first station
+    #[error("no surface where it begins")]
     NoSurface,
     /// the surface was lost
+    #[error("lost the surface")]
     Lost,
     /// an obstacle blocked the path
+    #[error("something stood in the way")]
     Blocked,
-}
-
-impl std::fmt::Display for SlideEnding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Arrived => "arrived",
-            Self::NoSurface => "no surface where it begins",
-            Self::Lost => "lost the surface",
-            Self::Blocked => "something stood in the way",
-        })
-    }
 }
 
 /// A slide that was made.
@@ -120,7 +105,7 @@ impl Slid<'_> {
     /// The direction of the path at the current station, unit vector, and the length to the next one, m.
     fn ahead(&self) -> (Vector3<f64>, f64) {
         let stations = &self.target.stations;
-        let direction = stations[self.station + 1].place - stations[self.station].place;
+        let direction = stations[self.station + 1].centre - stations[self.station].centre;
         (direction.try_normalize(0.0).unwrap_or_else(Vector3::zeros), direction.norm())
     }
 
@@ -128,7 +113,7 @@ impl Slid<'_> {
     fn advance(&mut self, place: &Vector3<f64>) -> bool {
         while self.station + 1 < self.target.stations.len() {
             let (direction, length) = self.ahead();
-            if (place - self.target.stations[self.station].place).dot(&direction) < length {
+            if (place - self.target.stations[self.station].centre.coords).dot(&direction) < length {
                 return true;
             }
             self.station += 1;
@@ -143,26 +128,26 @@ impl Slid<'_> {
 
     /// On along the path, and back to it where the ball is beside it.
     fn command(&self, place: &Vector3<f64>) -> Command {
-        let SlideStation { place: station, normal: here } = self.target.stations[self.station];
+        let Station { centre, normal: here } = self.target.stations[self.station];
         let next = self.target.stations[self.station + 1].normal;
         let (direction, length) = self.ahead();
         let speed = self.params.slide_speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
         // where the ball is when the command takes effect: half of the latency is the transmission
-        let gone = (place - station).dot(&direction) + speed * self.params.latency / 2.0;
+        let gone = (place - centre.coords).dot(&direction) + speed * self.params.latency / 2.0;
         let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
         let normal = Unit::new_normalize(here.into_inner() + (next.into_inner() - here.into_inner()) * share);
         let side = normal.cross(&direction);
-        let beside = (place - station).dot(&side);
+        let beside = (place - centre.coords).dot(&side);
         let along = direction - normal.into_inner() * direction.dot(&normal);
         self.press(&normal, along * speed - side * (beside * BACK_TO_PATH).clamp(-speed, speed))
     }
 
     /// Keeps the state; how the slide ended, if it has.
     fn observe(&mut self, state: &ArmState) -> Option<SlideEnding> {
-        let SlideStation { place, normal } = self.target.stations[self.station];
+        let Station { centre, normal } = self.target.stations[self.station];
         let force = state.wrench_b.force.dot(&normal);
         let (direction, _) = self.ahead();
-        let off = (state.pose_bt.translation.vector - place).dot(&normal);
+        let off = (state.pose_bt.translation.vector - centre.coords).dot(&normal);
         self.forces.push(force);
         self.none = if force < NONE * self.params.force { self.none + 1 } else { 0 };
         let is_against = -state.wrench_b.force.dot(&direction) > AGAINST * self.params.force;
@@ -178,9 +163,9 @@ impl Slid<'_> {
 
     fn seconds(&self) -> f64 {
         let pairs = self.target.stations.windows(2);
-        let seconds = |pair: &[SlideStation]| {
+        let seconds = |pair: &[Station]| {
             let turn = pair[0].normal.angle(&pair[1].normal);
-            ((pair[1].place - pair[0].place).norm() / self.params.slide_speed).max(turn / TURNING)
+            ((pair[1].centre - pair[0].centre).norm() / self.params.slide_speed).max(turn / TURNING)
         };
         pairs.map(seconds).sum()
     }
@@ -235,7 +220,6 @@ impl Watched<'_> {
             "looking for the surface of a slide",
             -normal * params.safe_speed(),
             target.lift + target.give,
-            &mut |_| {},
             &mut |state| {
                 contacts = if state.wrench_b.force.norm() > params.trigger { contacts + 1 } else { 0 };
                 contacts >= TRIGGERS

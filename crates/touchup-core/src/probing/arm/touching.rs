@@ -82,7 +82,8 @@ impl Watched<'_> {
         let mut contacts = 0;
         let mut reached = 0.0;
         let mut searched = |watched: &mut Self, doing, far: f64| {
-            watched.search(doing, fast, far, &mut |state| reached = line.depth(state), &mut |state| {
+            watched.search(doing, fast, far, &mut |state| {
+                reached = line.depth(state);
                 let is_contact =
                     line.presses(state) > params.trigger || state.wrench_b.force.norm() > ASIDE * params.trigger;
                 contacts = if is_contact { contacts + 1 } else { 0 };
@@ -144,7 +145,7 @@ impl Watched<'_> {
         let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
         let way_back = self.last().map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
         let mut free_at = None;
-        let is_free = self.search("backing off", -slow * BACK, way_back, &mut |_| {}, &mut |state| {
+        let is_free = self.search("backing off", -slow * BACK, way_back, &mut |state| {
             if line.presses(state) < params.trigger * FREE {
                 free_at.get_or_insert(line.depth(state));
             }
@@ -169,25 +170,19 @@ impl Watched<'_> {
         let stop_at = params.force - self.overshoot(params, slow.norm());
         let is_pressed = |state: &ArmState| line.presses(state) > stop_at;
         // a ball that slides down a rim is pushed aside more than back
-        self.search(
-            "measuring",
-            slow,
-            room + params.force / params.stiffness * SECOND,
-            &mut |state| states.push(*state),
-            &mut |state| is_pressed(state) || state.wrench_b.force.norm() > ASIDE * stop_at,
-        )?;
+        self.search("measuring", slow, room + params.force / params.stiffness * SECOND, &mut |state| {
+            states.push(*state);
+            is_pressed(state) || state.wrench_b.force.norm() > ASIDE * stop_at
+        })?;
         let pressed = states.iter().any(is_pressed);
         self.halt("measuring", &mut |state| states.push(*state))?;
         if let Some(corner) =
             states.iter().find(|state| state.wrench_b.force.norm() > params.trigger).map(|at| line.depth(at))
         {
-            self.search(
-                "coming back from the surface",
-                -slow,
-                self.limits().search,
-                &mut |state| states.push(*state),
-                &mut |state| line.depth(state) < corner - params.back_off,
-            )?;
+            self.search("coming back from the surface", -slow, self.limits().search, &mut |state| {
+                states.push(*state);
+                line.depth(state) < corner - params.back_off
+            })?;
             self.halt("coming back from the surface", &mut |_| {})?;
         }
         Ok(pressed)

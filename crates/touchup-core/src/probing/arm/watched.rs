@@ -317,7 +317,6 @@ impl<'a> Watched<'a> {
         doing: &'static str,
         velocity: Vector3<f64>,
         travel: f64,
-        each: &mut dyn FnMut(&ArmState),
         until: &mut dyn FnMut(&ArmState) -> bool,
     ) -> Result<bool, ProbeError> {
         let command = Command::Velocity { linear: velocity, acceleration: self.limits.acceleration };
@@ -326,7 +325,6 @@ impl<'a> Watched<'a> {
         loop {
             self.send(doing, &command)?;
             let state = self.next(doing)?;
-            each(&state);
             if until(&state) {
                 return Ok(true);
             }

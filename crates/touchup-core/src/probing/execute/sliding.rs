@@ -8,7 +8,7 @@ use super::links::clear_entry;
 use super::prober::Prober;
 use super::route::may_slide;
 use super::world::{Phase, distance};
-use crate::probing::arm::{SlideStation, SlideTarget};
+use crate::probing::arm::SlideTarget;
 use crate::probing::plan::{Slide, Station};
 
 impl Prober<'_> {
@@ -33,8 +33,8 @@ impl Prober<'_> {
     fn slide(&mut self, slide: &Slide, probing: &mut FeatureProbing) -> Result<ProbedSlide, Ending> {
         may_slide(self.cell, &self.params.limits, &probing.rotation, slide, &probing.out.joints)?;
         self.reach(&slide.above(0), probing, &mut true)?;
-        let in_b = |station: &Station| SlideStation {
-            place: (self.cell.pose_bo * station.centre).coords,
+        let in_b = |station: &Station| Station {
+            centre: self.cell.pose_bo * station.centre,
             normal: Unit::new_normalize(self.cell.pose_bo.rotation * station.normal.into_inner()),
         };
         let target = SlideTarget {

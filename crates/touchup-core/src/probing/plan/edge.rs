@@ -11,7 +11,7 @@ use super::search::{BELOW_RIM, ROUGH};
 use super::search_context::{PatternParams, Quantity, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
-use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, fit};
+use crate::features::fit::{FitParams, Freedom, Observation, Plane, fit};
 use crate::numeric::mean;
 
 /// Lower by this, over the ball's radius, is beyond the edge.
@@ -100,25 +100,20 @@ impl EdgePattern {
     fn part(&mut self, context: &mut SearchContext) -> bool {
         let ring = || self.seen.iter().take(RING + 1).map(|(place, _)| place);
         context.height = ring().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
-        let is_low = |p: &Point3<f64>| context.height - context.below(p) > BEYOND * context.params.ball_radius;
-        let [mut high, mut low] = [Vector3::zeros(); 2];
-        let [mut highs, mut lows] = [0.0f64; 2];
-        for place in ring() {
-            let at = Vector3::new(place.x, place.y, 0.0);
-            if is_low(place) {
-                (low, lows) = (low + at, lows + 1.0);
-            } else {
-                (high, highs) = (high + at, highs + 1.0);
-            }
-        }
-        self.over = (low / lows.max(1.0) - high / highs.max(1.0)).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let is_low = |p: &&Point3<f64>| context.height - context.below(p) > BEYOND * context.params.ball_radius;
+        let (low, high): (Vec<_>, Vec<_>) = ring().partition(is_low);
+        let middle = |places: &[&Point3<f64>]| {
+            let sum: Vector3<f64> = places.iter().map(|place| Vector3::new(place.x, place.y, 0.0)).sum();
+            sum / places.len().max(1) as f64
+        };
+        let over = (middle(&low) - middle(&high)).try_normalize(0.0).unwrap_or_else(Vector3::x);
         // nearer to the edge the ball may hang on it
-        let far = |p: &Point3<f64>| p.coords.dot(&self.over);
-        let lowest = || ring().filter(|place| is_low(place));
-        let farthest = lowest().map(far).fold(0.0, f64::max);
-        let ground = lowest().filter(|place| far(place) > CLEAR * farthest).map(|place| context.below(place));
-        self.ground_z = ground.fold(f64::NEG_INFINITY, f64::max);
-        lows > 0.0 && highs > 0.0
+        let far = |p: &Point3<f64>| p.coords.dot(&over);
+        let farthest = low.iter().map(|place| far(place)).fold(0.0, f64::max);
+        let ground = low.iter().filter(|place| far(place) > CLEAR * farthest).map(|place| context.below(place));
+        let (ground_z, has_both) = (ground.fold(f64::NEG_INFINITY, f64::max), !low.is_empty() && !high.is_empty());
+        (self.over, self.ground_z) = (over, ground_z);
+        has_both
     }
 
     fn take_ring(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -236,12 +231,6 @@ impl EdgePattern {
         let (chosen, measuring) = if self.is_top_next { (of_top, &mut self.top) } else { (of_side, &mut self.side) };
         chosen.map(|(possible, _)| measuring.aim(&possible))
     }
-
-    fn fitted(&self, context: &SearchContext) -> Result<[Fit<Plane>; 2], ExploreError> {
-        let top = fit(&self.top_plane(context), &self.top.observations, &FitParams::default())?;
-        let side = fit(&self.side_plane(context), &self.side.observations, &FitParams::default())?;
-        Ok([top, side])
-    }
 }
 
 impl Stage for EdgePattern {
@@ -298,7 +287,8 @@ impl Stage for EdgePattern {
         if self.phase != EdgePhase::Both {
             return Err(ExploreError::NotDone { touches: context.touches });
         }
-        let [top, side] = self.fitted(context)?;
+        let top = fit(&self.top_plane(context), &self.top.observations, &FitParams::default())?;
+        let side = fit(&self.side_plane(context), &self.side.observations, &FitParams::default())?;
         let along = |o: &Observation| context.in_f(&o.point).coords.dot(&self.along());
         let all = || self.top.observations.iter().chain(&self.side.observations).map(along);
         let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];

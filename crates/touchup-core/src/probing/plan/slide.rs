@@ -9,7 +9,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::search_context::{SearchContext, toward};
 
-/// A station of a slide, in O.
+/// A station of a slide: of a planned one in O, of one that is made in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
     /// of the ball, where it touches without pressing, m
