@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use crate::cli::pictures::write_picture;
 use crate::cli::{CliError, counted};
@@ -63,8 +63,7 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
         for (number, planned) in plan.touches.iter().enumerate() {
             let is_held_back = plan.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number));
             let colour = if is_held_back { HELD_BACK } else { SEARCH };
-            let end: Point3<f64> = planned.from + planned.direction.into_inner() * planned.search;
-            drawing.line(&planned.from, &end, LINE * size, colour);
+            drawing.line(&planned.from, &planned.end(), LINE * size, colour);
         }
     }
     flagged(&mut drawing, flags, size);

@@ -109,7 +109,12 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
     if equations.len() < FEWEST_POSES {
         return Err(TipError::TooFew { count: equations.len() });
     }
-    let found = fit(&equations, params.smallest_swing.sin().powi(2)).map_err(|least| too_small(&least, params))?;
+    let too_small = |least: Undetermined| TipError::TooSmall {
+        swing_deg: least.angle().to_degrees(),
+        wanted_deg: params.smallest_swing.to_degrees(),
+        axis: least.axis.into(),
+    };
+    let found = fit(&equations, params.smallest_swing.sin().powi(2)).map_err(too_small)?;
     let (rejected, poses) = (found.rejected(), equations.len());
     if found.rms > params.largest_rms || rejected as f64 > LARGEST_REJECTED * poses as f64 {
         return Err(TipError::NotAtRest { rms_mm: found.rms * 1e3, rejected, poses });
@@ -124,14 +129,6 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
         swing: least_determined(&equations, &found.kept).angle(),
         correlation,
     })
-}
-
-fn too_small(least: &Undetermined, params: &TipFitParams) -> TipError {
-    TipError::TooSmall {
-        swing_deg: least.angle().to_degrees(),
-        wanted_deg: params.smallest_swing.to_degrees(),
-        axis: least.axis.into(),
-    }
 }
 
 /// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise is not independent from pose to

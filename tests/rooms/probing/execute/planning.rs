@@ -11,7 +11,7 @@ use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, UrGeometry};
 use touchup::probing::execute::{
-    Cell, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan, turning_place,
+    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
@@ -297,7 +297,8 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
         let angle = share * std::f64::consts::FRAC_PI_3;
         Unit::new_normalize(Vector3::new(angle.sin(), 0.0, angle.cos()))
     };
-    let place = turning_place(&tool, &Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft, &wall).unwrap();
+    let upright = Clearance { tool: &tool, shaft: Vector3::z_axis(), distance: &wall };
+    let place = upright.turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft).unwrap();
     for step in 0..=100 {
         let direction = shaft(f64::from(step) / 100.0);
         for mm in 0..=600 {
@@ -307,7 +308,7 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
     }
     // away from the wall it turns where it is
     let away = |share: f64| Unit::new_normalize(Vector3::new(-share, 0.0, 1.0));
-    let place = turning_place(&tool, &Point3::origin(), std::f64::consts::FRAC_PI_4, &away, &wall).unwrap();
+    let place = upright.turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_4, &away).unwrap();
     assert_eq!(place, Point3::origin());
 }
 
@@ -324,7 +325,7 @@ proptest! {
         let distance = |p: &Point3<f64>, reach: f64| {
             places.iter().map(|place| (p - Point3::from(*place)).norm()).fold(reach, f64::min)
         };
-        let room = tool.room(&Point3::origin(), &shaft, &distance, reach);
+        let room = Clearance { tool: &tool, shaft, distance: &distance }.room(&Point3::origin(), reach);
         let from_shaft = |place: &[f64; 3]| {
             let p = Vector3::from(*place);
             (p - shaft.into_inner() * p.dot(&shaft).clamp(0.0, tool.shaft_length)).norm()

@@ -64,7 +64,7 @@ pub fn plan(
     let rotation = cell.upright(&now.pose_bt.rotation, &normal);
     let pattern = PatternParams { flag_radius: flag.radius, ..params.pattern };
     let mut explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
-    let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
+    let clear = distance(world);
     let mut at = ToolState::of(cell, now);
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
     let reach = |reached: Result<Joints, LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {

@@ -72,28 +72,34 @@ const LEAST_STEP: f64 = 20e-6;
 /// Least step of a turn, rad: by it the far end of a shaft of 60 mm moves by 0.06 mm.
 const LEAST_TURN: f64 = 1e-3;
 
-impl Tool {
+/// A tool near a mesh.
+#[derive(Clone, Copy)]
+pub struct Clearance<'a> {
+    /// what must keep clear
+    pub tool: &'a Tool,
+    /// From the ball to the handle: up is along it.
+    pub shaft: Unit<Vector3<f64>>,
+    /// Of a place from the mesh, as far as a reach, m.
+    pub distance: &'a dyn Fn(&Point3<f64>, f64) -> f64,
+}
+
+impl Clearance<'_> {
     /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh, or nearer than the margin, and
     /// how deep is not known.
     ///
-    /// - `reach`: no more room than that matters, m; `shaft`: from the ball to the handle; `distance`: of a place from the mesh, as far as a reach.
-    pub fn room(
-        &self,
-        centre: &Point3<f64>,
-        shaft: &Unit<Vector3<f64>>,
-        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-        reach: f64,
-    ) -> f64 {
+    /// - `reach`: no more room than that matters, m.
+    pub fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
+        let Tool { ball_radius, shaft_radius, shaft_length, margin } = *self.tool;
         let reach = reach.max(LEAST_STEP);
-        let around = |p: &Point3<f64>, radius: f64| distance(p, radius + self.margin + reach) - radius - self.margin;
-        let mut room = around(centre, self.ball_radius);
+        let around = |p: &Point3<f64>, radius: f64| (self.distance)(p, radius + margin + reach) - radius - margin;
+        let mut room = around(centre, ball_radius);
         // balls of a little more than the shaft's radius hide all of it
-        let spacing = self.shaft_radius;
-        let radius = self.shaft_radius * 1.25f64.sqrt();
-        let count = (self.shaft_length / spacing).ceil() as usize;
+        let spacing = shaft_radius;
+        let radius = shaft_radius * 1.25f64.sqrt();
+        let count = (shaft_length / spacing).ceil() as usize;
         let mut at = 1;
         while at <= count && room >= 0.0 {
-            let here = around(&(centre + shaft.into_inner() * (at as f64 * spacing)), radius);
+            let here = around(&(centre + self.shaft.into_inner() * (at as f64 * spacing)), radius);
             // those within half of the room here have the other half at the least
             let skipped = (here / 2.0 / spacing).max(0.0) as usize;
             room = room.min(if skipped > 0 { here / 2.0 } else { here });
@@ -103,35 +109,93 @@ impl Tool {
     }
 
     /// Whether a straight line is clear.
-    fn is_clear(
-        &self,
-        from: &Point3<f64>,
-        to: &Point3<f64>,
-        shaft: &Unit<Vector3<f64>>,
-        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-    ) -> bool {
+    fn is_clear(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let length = (to - from).norm();
         let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
-        let room = |gone: f64| self.room(&(from + direction * gone), shaft, distance, length - gone);
+        let room = |gone: f64| self.room(&(from + direction * gone), length - gone);
         is_clear_along(length, room, |room| room.max(LEAST_STEP))
     }
 
     /// Whether the tool keeps clear while it turns about the ball.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it.
-    fn can_turn(
-        &self,
-        centre: &Point3<f64>,
-        angle: f64,
-        shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
-        distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-    ) -> bool {
-        let length = self.shaft_length + self.shaft_radius;
+    fn can_turn(&self, centre: &Point3<f64>, angle: f64, shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>) -> bool {
+        let length = self.tool.shaft_length + self.tool.shaft_radius;
         // nothing of it moves farther than its far end
-        let room = |turned: f64| self.room(centre, &shaft(turned / angle), distance, length * (angle - turned));
+        let room = |turned: f64| Self { shaft: shaft(turned / angle), ..*self }.room(centre, length * (angle - turned));
         is_clear_along(angle, room, |room| (room / length).max(LEAST_TURN))
     }
+
+    /// The place where the tool can turn about its ball and keeps clear: where it is, or as little as can be out along its shaft.
+    ///
+    /// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the handle.
+    ///
+    /// # Errors
+    /// [`LinkError::NoTurn`].
+    pub fn turning_place(
+        &self,
+        from: &Point3<f64>,
+        angle: f64,
+        shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
+    ) -> Result<Point3<f64>, LinkError> {
+        let places = (0..TURN_PLACES).map(|times| from + self.shaft.into_inner() * (TURN_RAISE * times as f64));
+        let mut reached = places.take_while(|place| self.is_clear(from, place));
+        let no_turn = LinkError::NoTurn { place_mm: (from * 1e3).coords.into(), angle_deg: angle.to_degrees() };
+        reached.find(|place| self.can_turn(place, angle, shaft)).ok_or(no_turn)
+    }
+
+    /// The place at or above an entry that is clear: from there on down nothing is fast.
+    ///
+    /// # Errors
+    /// [`LinkError::NoPath`].
+    pub(super) fn entry(&self, entry: &Point3<f64>) -> Result<Point3<f64>, LinkError> {
+        let mut raised = (0..RAISES).map(|times| entry + self.shaft.into_inner() * (RAISE * times as f64));
+        raised.find(|entry| self.room(entry, 0.0) >= 0.0).ok_or(self.no_path(entry))
+    }
+
+    /// The places that the tool goes through from one place to another, without the first; both are in free air.
+    ///
+    /// - `highest`: of the mesh along the shaft, m from the origin of O.
+    ///
+    /// # Errors
+    /// [`LinkError::NoPath`].
+    pub(super) fn path(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        highest: f64,
+    ) -> Result<Vec<Point3<f64>>, LinkError> {
+        if self.is_clear(from, to) {
+            return Ok(vec![*to]);
+        }
+        let height = |p: &Point3<f64>| p.coords.dot(&self.shaft);
+        let lowest = height(from).max(height(to));
+        // above all: the ball clears the highest place
+        let top = (highest + self.tool.ball_radius + 2.0 * self.tool.margin).max(lowest);
+        let lifted = |p: &Point3<f64>, to: f64| p + self.shaft.into_inner() * (to - height(p));
+        for step in 1..=HEIGHTS {
+            let at = lowest + (top - lowest) * step as f64 / HEIGHTS as f64;
+            let places = [*from, lifted(from, at), lifted(to, at), *to];
+            if places.windows(2).all(|pair| self.is_clear(&pair[0], &pair[1])) {
+                return Ok(places[1..].to_vec());
+            }
+        }
+        Err(self.no_path(to))
+    }
+
+    fn no_path(&self, to: &Point3<f64>) -> LinkError {
+        LinkError::NoPath { place_mm: (to * 1e3).coords.into(), margin_mm: self.tool.margin * 1e3 }
+    }
 }
+
+/// Where it cannot turn it is tried this much farther out, m …
+const TURN_RAISE: f64 = 5e-3;
+/// … at so many places.
+const TURN_PLACES: usize = 20;
+/// An entry that is not clear is raised by this, m …
+const RAISE: f64 = 2e-3;
+/// … so often at most.
+const RAISES: usize = 30;
 
 /// Whether there is room all along a path from 0 to an end.
 ///
@@ -150,84 +214,6 @@ fn is_clear_along(end: f64, room: impl Fn(f64) -> f64, step: impl Fn(f64) -> f64
     }
 }
 
-/// The place where a tool can turn about its ball and keeps clear: where it is, or as little as can be out along its shaft.
-///
-/// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the handle.
-///
-/// # Errors
-/// [`LinkError::NoTurn`].
-pub fn turning_place(
-    tool: &Tool,
-    from: &Point3<f64>,
-    angle: f64,
-    shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
-    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-) -> Result<Point3<f64>, LinkError> {
-    let out = shaft(0.0);
-    let places = (0..TURN_PLACES).map(|times| from + out.into_inner() * (TURN_RAISE * times as f64));
-    let is_free = |place: &Point3<f64>| tool.is_clear(from, place, &out, distance);
-    let no_turn = LinkError::NoTurn { place_mm: (from * 1e3).coords.into(), angle_deg: angle.to_degrees() };
-    let mut reached = places.take_while(is_free);
-    reached.find(|place| tool.can_turn(place, angle, shaft, distance)).ok_or(no_turn)
-}
-
-/// Where it cannot turn it is tried this much farther out, m …
-const TURN_RAISE: f64 = 5e-3;
-/// … at so many places.
-const TURN_PLACES: usize = 20;
-
-/// An entry that is not clear is raised by this, m …
-const RAISE: f64 = 2e-3;
-/// … so often at most.
-const RAISES: usize = 30;
-
-/// The place at or above an entry that is clear: from there on down nothing is fast.
-///
-/// # Errors
-/// [`LinkError::NoPath`].
-pub(super) fn clear_entry(
-    tool: &Tool,
-    entry: &Point3<f64>,
-    shaft: &Unit<Vector3<f64>>,
-    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-) -> Result<Point3<f64>, LinkError> {
-    let mut raised = (0..RAISES).map(|times| entry + shaft.into_inner() * (RAISE * times as f64));
-    let no_path = LinkError::NoPath { place_mm: (entry * 1e3).coords.into(), margin_mm: tool.margin * 1e3 };
-    raised.find(|entry| tool.room(entry, shaft, distance, 0.0) >= 0.0).ok_or(no_path)
-}
-
-/// The places that a tool goes through from one place to another, without the first; both are in free air.
-///
-/// - `shaft`: from the ball to the handle: up is along it; `highest`: of the mesh along it, m from the origin of O.
-///
-/// # Errors
-/// [`LinkError::NoPath`].
-pub fn free_path(
-    tool: &Tool,
-    from: &Point3<f64>,
-    to: &Point3<f64>,
-    shaft: &Unit<Vector3<f64>>,
-    highest: f64,
-    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-) -> Result<Vec<Point3<f64>>, LinkError> {
-    if tool.is_clear(from, to, shaft, distance) {
-        return Ok(vec![*to]);
-    }
-    let height = |p: &Point3<f64>| p.coords.dot(shaft);
-    let lowest = height(from).max(height(to));
-    // above all: the ball clears the highest place
-    let top = (highest + tool.ball_radius + 2.0 * tool.margin).max(lowest);
-    let lifted = |p: &Point3<f64>, to: f64| p + shaft.into_inner() * (to - height(p));
-    for step in 1..=HEIGHTS {
-        let at = lowest + (top - lowest) * step as f64 / HEIGHTS as f64;
-        let places = [*from, lifted(from, at), lifted(to, at), *to];
-        if places.windows(2).all(|pair| tool.is_clear(&pair[0], &pair[1], shaft, distance)) {
-            return Ok(places[1..].to_vec());
-        }
-    }
-    Err(LinkError::NoPath { place_mm: (to * 1e3).coords.into(), margin_mm: tool.margin * 1e3 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -237,13 +223,17 @@ mod tests {
         place.z.min(reach)
     }
 
+    fn upright(tool: &Tool) -> Clearance<'_> {
+        Clearance { tool, shaft: Vector3::z_axis(), distance: &above_a_plate }
+    }
+
     #[test]
     fn an_entry_too_near_is_raised_until_it_is_clear() {
         let (tool, up) = (Tool::default(), Vector3::z_axis());
         let needed = tool.ball_radius + tool.margin;
         for height in [-5e-3, 0.0, 1e-3, needed - 1e-6, needed + 1e-6, 20e-3] {
             let entry = Point3::new(3e-3, -2e-3, height);
-            let clear = clear_entry(&tool, &entry, &up, &above_a_plate).unwrap();
+            let clear = upright(&tool).entry(&entry).unwrap();
             let raises = ((needed - height).max(0.0) / RAISE).ceil();
             assert!((clear - entry - up.into_inner() * (raises * RAISE)).norm() < 1e-12, "from {height}: {clear}");
             assert!(clear.z >= needed);
@@ -253,7 +243,7 @@ mod tests {
     #[test]
     fn an_entry_that_is_never_clear_is_refused() {
         let deep = Point3::new(0.0, 0.0, -1.0);
-        let refused = clear_entry(&Tool::default(), &deep, &Vector3::z_axis(), &above_a_plate);
+        let refused = upright(&Tool::default()).entry(&deep);
         assert_eq!(refused, Err(LinkError::NoPath { place_mm: [0.0, 0.0, -1e3], margin_mm: 0.5 }));
     }
 }

@@ -22,7 +22,7 @@ pub use cell::Cell;
 pub use cone::{NotReached, Orientation};
 pub use dry_run::{HeldBack, Plan, PlannedMotion, plan};
 pub use ending::{Ending, Probed, ProbedSlide, ProbedTouch};
-pub use links::{LinkError, Tool, free_path, turning_place};
+pub use links::{Clearance, LinkError, Tool};
 pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use repeat::{Repeatability, SpotError, SpotTouch};

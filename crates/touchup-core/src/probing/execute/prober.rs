@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Unit};
 use super::cell::Cell;
 use super::ending::{Ending, Probed, ProbedTouch};
 use super::feature_probing::FeatureProbing;
-use super::links::{LinkError, Tool};
+use super::links::{Clearance, LinkError, Tool};
 use super::route::{ToolState, may_touch, route};
 use super::world::{Phase, Progress, World, distance, normal_about, on_mesh};
 use crate::features::Kind;
@@ -129,12 +129,12 @@ impl<'a> Prober<'a> {
     /// Where the arm is, at rest in free air with its sensor zeroed.
     pub(super) fn in_free_air(&mut self) -> Result<ArmState, Ending> {
         // zeroing the sensor would remove a force that acts now
-        let world = &*self.world;
-        let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
         let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
         let now = self.arm.next_state().map_err(arm)?;
         let (here, bare) = (self.cell.place(&now.pose_bt), Tool { margin: 0.0, ..self.cell.tool });
-        if bare.room(&here, &self.cell.shaft(&now.pose_bt.rotation), &clear, 0.0) < 0.0 {
+        let shaft = self.cell.shaft(&now.pose_bt.rotation);
+        let room = Clearance { tool: &bare, shaft, distance: &distance(&*self.world) }.room(&here, 0.0);
+        if room < 0.0 {
             let place_mm = (here * 1e3).coords.into();
             return Err(LinkError::InPart { place_mm }.into());
         }
@@ -327,7 +327,7 @@ impl<'a> Prober<'a> {
             search: planned.search,
             expected: planned.expected,
         };
-        let before = Before::of(self.world, planned, self.params.pattern.ball_radius);
+        let before = distances(self.world, planned, self.params.pattern.ball_radius);
         self.world.enter(Phase::Search);
         let touch = &self.params.touch;
         let mut watched = self.watched();
@@ -342,7 +342,12 @@ impl<'a> Prober<'a> {
     }
 
     /// The result for the explorer, and the record of the touch.
-    fn probed_touch(&self, planned: TouchPlan, record: TouchRecord, before: &Before) -> (TouchResult, ProbedTouch) {
+    fn probed_touch(
+        &self,
+        planned: TouchPlan,
+        record: TouchRecord,
+        before: &[Option<f64>],
+    ) -> (TouchResult, ProbedTouch) {
         let (result, refused) = match &record.outcome {
             TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
                 (TouchResult::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
@@ -359,7 +364,7 @@ impl<'a> Prober<'a> {
             TouchOutcome::Unclear(error) => (TouchResult::Unclear, Some(error.to_string())),
         };
         let centre = if let TouchResult::At { centre, .. } = result { Some(centre) } else { None };
-        let deviation = centre.and_then(|centre| before.deviation(&planned, &centre));
+        let deviation = centre.and_then(|centre| deviation(before, &planned, &centre));
         (result, ProbedTouch { planned, record: Some(record), centre, deviation, refused })
     }
 
@@ -382,31 +387,25 @@ impl<'a> Prober<'a> {
     }
 }
 
-/// How far the mesh is along the path of a touch, as it is before the touch moves it.
-struct Before {
-    /// distance of a ball from it at each [`SAMPLED`] of the path, m, positive outside; `None` where no mesh is near
-    distances: Vec<Option<f64>>,
+/// Distance of a ball from the mesh at each [`SAMPLED`] of the path of a touch, before the touch moves the mesh; m, positive outside,
+/// `None` where no mesh is near.
+fn distances(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Vec<Option<f64>> {
+    let count = (planned.search / SAMPLED).ceil() as usize + 1;
+    let at = |sample: usize| {
+        let centre = planned.from + planned.direction.into_inner() * (SAMPLED * sample as f64);
+        let hit = world.closest_face(&centre, DEVIATION_REACH)?;
+        let off = centre - hit.point;
+        Some(off.norm().copysign(off.dot(&world.mesh().normal(hit.face))) - ball_radius)
+    };
+    (0..=count).map(at).collect()
 }
 
-impl Before {
-    fn of(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Self {
-        let count = (planned.search / SAMPLED).ceil() as usize + 1;
-        let at = |sample: usize| {
-            let centre = planned.from + planned.direction.into_inner() * (SAMPLED * sample as f64);
-            let hit = world.closest_face(&centre, DEVIATION_REACH)?;
-            let off = centre - hit.point;
-            Some(off.norm().copysign(off.dot(&world.mesh().normal(hit.face))) - ball_radius)
-        };
-        Self { distances: (0..=count).map(at).collect() }
-    }
-
-    /// How far the surface that a ball touched is from the mesh, m, positive outside.
-    fn deviation(&self, planned: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
-        let at = ((centre - planned.from).dot(&planned.direction) / SAMPLED).max(0.0);
-        let sample = at as usize;
-        let (here, next) = ((*self.distances.get(sample)?)?, (*self.distances.get(sample + 1)?)?);
-        Some(here + (next - here) * (at - at.floor()))
-    }
+/// How far the surface that a ball touched was from the mesh, m, positive outside.
+fn deviation(distances: &[Option<f64>], planned: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
+    let at = ((centre - planned.from).dot(&planned.direction) / SAMPLED).max(0.0);
+    let sample = at as usize;
+    let (here, next) = ((*distances.get(sample)?)?, (*distances.get(sample + 1)?)?);
+    Some(here + (next - here) * (at - at.floor()))
 }
 
 /// The distance from the mesh is sampled this often along the path of a touch, m: between two of them a wall with a radius of 1 mm bends by 1 µm.

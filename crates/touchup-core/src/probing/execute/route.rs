@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitQuaternion};
 
 use super::cell::Cell;
 use super::ending::Ending;
-use super::links::{clear_entry, free_path, turning_place};
+use super::links::Clearance;
 use super::world::{World, distance, highest};
 use crate::probing::arm::{ArmState, Joints, LimitError, Limits};
 use crate::probing::plan::{Slide, TouchPlan};
@@ -87,24 +87,25 @@ pub(super) fn route(
     rotation: &UnitQuaternion<f64>,
     entry: &Point3<f64>,
 ) -> Result<Route, Ending> {
-    let clear = |place: &Point3<f64>, reach: f64| distance(world, place, reach);
-    let (tool, shaft) = (&cell.tool, cell.shaft(rotation));
+    let clear = distance(world);
     let mut route = Route { stops: Vec::new(), joints: at.joints };
     let mut place = at.place;
     let turn = at.rotation.rotation_to(rotation);
     let angle = turn.angle();
     if let Some(axis) = turn.axis().filter(|_| angle > TURNS) {
         let turned = |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * at.rotation;
-        place = turning_place(tool, &at.place, angle, &|share| cell.shaft(&turned(share)), &clear)?;
+        let shaft = |share: f64| cell.shaft(&turned(share));
+        let upon = Clearance { tool: &cell.tool, shaft: shaft(0.0), distance: &clear };
+        place = upon.turning_place(&at.place, angle, &shaft)?;
         let steps = (angle / TURN_STEP).ceil().max(1.0);
         for step in 0..=steps as usize {
             route.joints = cell.check(limits, &turned(step as f64 / steps), &place, &route.joints)?;
         }
         route.stops.extend([(place, at.rotation), (place, *rotation)]);
     }
-    let entry = clear_entry(tool, entry, &shaft, &clear)?;
-    let top = highest(world.mesh(), &shaft);
-    for place in free_path(tool, &place, &entry, &shaft, top, &clear)? {
+    let clearance = Clearance { tool: &cell.tool, shaft: cell.shaft(rotation), distance: &clear };
+    let entry = clearance.entry(entry)?;
+    for place in clearance.path(&place, &entry, highest(world.mesh(), &clearance.shaft))? {
         route.joints = cell.check(limits, rotation, &place, &route.joints)?;
         route.stops.push((place, *rotation));
     }

@@ -4,7 +4,7 @@ use nalgebra::Unit;
 
 use super::ending::{Ending, ProbedSlide};
 use super::feature_probing::FeatureProbing;
-use super::links::clear_entry;
+use super::links::Clearance;
 use super::prober::Prober;
 use super::route::may_slide;
 use super::world::{Phase, distance};
@@ -59,12 +59,11 @@ impl Prober<'_> {
     fn leave_from(&self, slide: &Slide, station: usize, probing: &mut FeatureProbing) {
         let above = slide.above(station);
         probing.is_inside(slide.lifted(station), above);
-        let world = &*self.world;
-        let clear = |place: &nalgebra::Point3<f64>, reach: f64| distance(world, place, reach);
+        let clear = distance(&*self.world);
         // where nothing says that it is clear there, it goes back to where it came from
-        let Ok(place) = clear_entry(&self.cell.tool, &above, &self.cell.shaft(&probing.rotation), &clear) else {
-            return;
-        };
+        let shaft = self.cell.shaft(&probing.rotation);
+        let clearance = Clearance { tool: &self.cell.tool, shaft, distance: &clear };
+        let Ok(place) = clearance.entry(&above) else { return };
         if let Ok(joints) = self.cell.check(&self.params.limits, &probing.rotation, &place, &probing.out.joints) {
             (probing.out.place, probing.out.joints) = (place, joints);
         }

@@ -89,8 +89,8 @@ const NEAR: f64 = 20e-3;
 const ALIKE: f64 = 0.7;
 
 /// Distance of a place from the mesh, m; at most the reach.
-pub(super) fn distance(world: &dyn World, place: &Point3<f64>, reach: f64) -> f64 {
-    world.closest_face(place, reach).map_or(reach, |hit| (place - hit.point).norm())
+pub(super) fn distance(world: &dyn World) -> impl Fn(&Point3<f64>, f64) -> f64 {
+    |place, reach| world.closest_face(place, reach).map_or(reach, |hit| (place - hit.point).norm())
 }
 
 /// Outward normal of the surface around a flag: the mean of the faces there that face the handle of the probe, weighted by

@@ -6,7 +6,7 @@ use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::error::ExploreError;
 use super::hole::numbers;
 use super::pattern::{Stage, Touched};
-use super::search::{AROUND, BELOW_RIM, ROUGH};
+use super::search::{AROUND, ROUGH};
 use super::search_context::{RING, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::Slide;
 use crate::features::Feature;
@@ -22,8 +22,6 @@ const BESIDE: f64 = 1.2;
 const OFF_GROUND: f64 = 0.4e-3;
 /// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 5.0;
-/// The wall is touched no higher than this share of how deep it may be.
-const HIGH: f64 = 0.6;
 /// The top is slid over so far towards its middle.
 const HALF: f64 = 0.5;
 /// Heights within this are of one surface, m.
@@ -62,8 +60,7 @@ impl BossPattern {
 
     /// How far below the top the wall is touched: between the edge of the top and the ground, m; at the highest and the deepest.
     fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
-        let deep = context.above_ground("boss", self.ground_z, OFF_GROUND)?;
-        Ok([(BELOW_RIM * context.params.ball_radius).min(HIGH * deep), deep])
+        context.above_ground("boss", self.ground_z, OFF_GROUND)
     }
 
     fn take_top(&mut self, context: &mut SearchContext, touch: &Touched) {

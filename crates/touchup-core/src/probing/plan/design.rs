@@ -127,12 +127,8 @@ impl Knowledge {
     /// The candidate with the largest gain, the first among equals; `None` when none has a gain.
     pub fn best<M: Surface>(&self, surface: &M, candidates: &[Candidate], asked: &Asked) -> Option<usize> {
         let gains = candidates.iter().map(|touch| self.gain(surface, touch, asked)).enumerate();
-        let best = gains.fold(None, |best: Option<(usize, f64)>, (index, gain)| match best {
-            Some((_, most)) if gain <= most => best,
-            _ if gain > 0.0 => Some((index, gain)),
-            _ => best,
-        });
-        best.map(|(index, _)| index)
+        let some = gains.filter(|(_, gain)| *gain > 0.0);
+        some.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(index, _)| index)
     }
 
     /// Up to `count` touches with the largest gain together; fewer when all has the requested uncertainty.

@@ -7,7 +7,7 @@ use super::error::ExploreError;
 use super::hole::numbers;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::{Stage, Touched};
-use super::search::{BELOW_RIM, ROUGH};
+use super::search::ROUGH;
 use super::search_context::{PatternParams, Quantity, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
@@ -36,10 +36,8 @@ const REACH: f64 = 2.0;
 const ALONG: usize = 9;
 /// Touches of the top stay this far from the edge, over the ball's radius; and this far at most.
 const TOP: [f64; 2] = [0.7, 4.0];
-/// Slides come so far over the top, over the same …
+/// Slides come so far over the top, over the same.
 const BACK: f64 = 3.0;
-/// … and down to this share of how deep the side may be touched, or as far as a rim may be broken.
-const HIGH: f64 = 0.6;
 /// What leans more is another surface, rad.
 const LEAN: f64 = 0.1;
 /// So many touches of each face before it is believed.
@@ -88,8 +86,7 @@ impl EdgePattern {
     /// Keeps a touch from above, also a miss.
     fn record(&mut self, context: &SearchContext, touch: &Touched) {
         // as deep as the search went
-        let lowest =
-            || context.in_f(&(touch.planned.from + touch.planned.direction.into_inner() * touch.planned.search));
+        let lowest = || context.in_f(&touch.planned.end());
         if touch.result != TouchResult::Unclear {
             self.seen.push((touch.place.unwrap_or_else(lowest), touch.observation));
         }
@@ -143,8 +140,8 @@ impl EdgePattern {
         self.phase = if has_both { EdgePhase::Side } else { EdgePhase::NoEdge };
     }
 
-    /// How far below the top the side is touched, m.
-    fn depth(&self, context: &SearchContext) -> Result<f64, ExploreError> {
+    /// How far below the top the side is touched, m; at the highest and the deepest.
+    fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
         context.above_ground("edge", self.ground_z, OFF_GROUND)
     }
 
@@ -251,10 +248,11 @@ impl Stage for EdgePattern {
             }
             EdgePhase::Side => {
                 let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius;
-                self.inward(context, along, self.depth(context)?)
+                let [_, deep] = self.depths(context)?;
+                self.inward(context, along, deep)
             }
             EdgePhase::Both => {
-                let deep = self.depth(context)?;
+                let [_, deep] = self.depths(context)?;
                 return Ok(self.next_of_both(context, deep));
             }
         }))
@@ -315,7 +313,7 @@ impl Stage for EdgePattern {
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Ok(deep) = self.depth(context) else { return Vec::new() };
+        let Ok(depths) = self.depths(context) else { return Vec::new() };
         let PatternParams { ball_radius, clearance, flag_radius, .. } = context.params;
         let to_f = context.pose_of.inverse() * self.side_plane(context).pose_of;
         let reach = REACH * flag_radius;
@@ -325,7 +323,7 @@ impl Stage for EdgePattern {
             length: 2.0 * reach,
             is_closed: false,
             back: BACK * ball_radius,
-            depths: [(BELOW_RIM * ball_radius).min(HIGH * deep), deep],
+            depths,
             room: clearance,
         };
         rim.slides(context)

@@ -36,6 +36,8 @@ const OFF_FLOOR: f64 = 0.3e-3;
 pub(super) const BELOW_RIM: f64 = 0.7;
 /// A wall that may be touched no deeper than this, over the ball's radius, is too low.
 const TOO_LOW: f64 = 0.2;
+/// Else it is touched no higher than this share of how deep it may be.
+const HIGH: f64 = 0.6;
 
 impl SearchContext {
     /// How far below the surface a wall may be touched, with the floor of its opening at a place of the ball's centre, m.
@@ -43,22 +45,20 @@ impl SearchContext {
         depth.min(self.height - centre.z - OFF_FLOOR).max(BELOW_RIM * self.params.ball_radius)
     }
 
-    /// How far below the surface a wall may be touched that stands on the ground, m.
+    /// How far below the surface a wall may be touched that stands on the ground, m; at the highest and the deepest.
     ///
     /// - `off`: the ball stays this far above the ground, m.
     ///
     /// # Errors
     /// [`ExploreError::TooLow`].
-    pub fn above_ground(&self, kind: &'static str, ground_z: f64, off: f64) -> Result<f64, ExploreError> {
+    pub fn above_ground(&self, kind: &'static str, ground_z: f64, off: f64) -> Result<[f64; 2], ExploreError> {
         let ball = self.params.ball_radius;
         let deepest = self.height - ground_z - ball - off;
-        match deepest > TOO_LOW * ball {
-            true => Ok(deepest.min(SHALLOW * ball)),
-            false => {
-                let height_mm = (self.height - ground_z) * 1e3;
-                Err(ExploreError::TooLow { kind, height_mm, ball_mm: ball * 2e3 })
-            }
+        if deepest > TOO_LOW * ball {
+            let deep = deepest.min(SHALLOW * ball);
+            return Ok([(BELOW_RIM * ball).min(HIGH * deep), deep]);
         }
+        Err(ExploreError::TooLow { kind, height_mm: (self.height - ground_z) * 1e3, ball_mm: ball * 2e3 })
     }
 }
 

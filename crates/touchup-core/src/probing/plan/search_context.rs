@@ -94,6 +94,13 @@ pub struct TouchPlan {
     pub expected: Option<Expected>,
 }
 
+impl TouchPlan {
+    /// Centre of the ball where a search without contact ends.
+    pub fn end(&self) -> Point3<f64> {
+        self.from + self.direction.into_inner() * self.search
+    }
+}
+
 /// How far from where a search begins the surface is expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {

@@ -201,7 +201,7 @@ impl SlotPattern {
     fn take_wall(&mut self, touch: &Touched) {
         self.measuring.take(touch);
         if touch.result == TouchResult::Nothing {
-            self.free.push(end_of(&touch.planned));
+            self.free.push(touch.planned.end());
         }
     }
 
@@ -246,11 +246,6 @@ impl SlotPattern {
         }
         self.phase = SlotPhase::Wall;
     }
-}
-
-/// Where a search without contact ends: the ball's centre, m in O.
-fn end_of(planned: &TouchPlan) -> Point3<f64> {
-    planned.from + planned.direction.into_inner() * planned.search
 }
 
 /// Places around the walls of a slot: along each side, then about the middle of each end; x of the middle line that a place is touched
@@ -314,7 +309,7 @@ impl Stage for SlotPattern {
             SlotPhase::Opening => {
                 if let Some(place) = self.opening.take(context, touch) {
                     self.middle = place;
-                    self.free = vec![end_of(&touch.planned)];
+                    self.free = vec![touch.planned.end()];
                     self.phase = SlotPhase::First;
                 }
             }
