@@ -295,20 +295,15 @@ impl ForceCurve<'_> {
     /// Travel at a time and how fast it grows, between the moments; beyond them it goes on as at the end.
     fn travel(&self, t: f64) -> (f64, f64) {
         let after = self.moments.partition_point(|m| m.t <= t);
-        match (after.checked_sub(1), self.moments.get(after)) {
-            (Some(before), Some(next)) => {
-                let (a, b) = (self.path[before], self.path[after]);
-                let share = (t - self.moments[before].t) / (next.t - self.moments[before].t);
+        let before = after.saturating_sub(1);
+        let (a, since) = (self.path[before], t - self.moments[before].t);
+        match self.path.get(after).filter(|_| after > 0) {
+            Some(b) => {
+                let share = since / (self.moments[after].t - self.moments[before].t);
                 (a.travel + (b.travel - a.travel) * share, a.speed + (b.speed - a.speed) * share)
             }
-            (Some(last), None) => self.beyond(last, t),
-            (None, _) => self.beyond(0, t),
+            None => (a.travel + a.speed * since, a.speed),
         }
-    }
-
-    fn beyond(&self, end: usize, t: f64) -> (f64, f64) {
-        let Smooth { travel, speed, .. } = self.path[end];
-        (travel + speed * (t - self.moments[end].t), speed)
     }
 
     /// First guess of k, N/m.
