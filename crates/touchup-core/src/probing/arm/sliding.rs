@@ -184,11 +184,11 @@ impl Watched<'_> {
         params: &TouchParams,
         reached: &mut Option<usize>,
     ) -> Result<SlideRecord, ProbeError> {
-        self.forget_peak();
+        self.peak_force = 0.0;
         self.line("going to where a slide begins", &target.lifted(0), params.safe_speed(), params, params.trigger)?;
         *reached = Some(0);
         let begun_ns = self.next(SLIDING)?.stamp_ns;
-        let window = (WINDOW / self.period()).ceil() as usize;
+        let window = (WINDOW / self.arm.period()).ceil() as usize;
         let mut slid = Slid { target, params, station: 0, forces: Vec::new(), none: 0, against: 0, window };
         let is_contact = self.find_surface(target, params)?;
         let mut stamps_ns = [begun_ns; 2];
@@ -208,7 +208,7 @@ impl Watched<'_> {
             reached: slid.station,
             mean_force: mean(&slid.forces),
             worst_force: worst,
-            peak_force: self.peak_force(),
+            peak_force: self.peak_force,
         })
     }
 
@@ -274,6 +274,6 @@ impl Watched<'_> {
     fn leave(&mut self, target: &SlideTarget, station: usize, params: &TouchParams) -> Result<(), ProbeError> {
         let doing = "leaving the surface after a slide";
         self.halt(doing, &mut |_| {})?;
-        self.line(doing, &target.lifted(station), params.safe_speed(), params, self.limits().force)
+        self.line(doing, &target.lifted(station), params.safe_speed(), params, self.limits.force)
     }
 }

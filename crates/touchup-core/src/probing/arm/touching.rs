@@ -72,13 +72,13 @@ impl Watched<'_> {
     /// # Errors
     /// [`ProbeError`]; a miss is none.
     pub fn touch(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<TouchRecord, ProbeError> {
-        self.forget_peak();
+        self.peak_force = 0.0;
         self.line(GOING, &target.standoff_bt, params.safe_speed(), params, params.trigger)?;
         let begun = self.next(GOING)?.stamp_ns;
         let line = ApproachLine::of(target);
-        let travel = target.search.min(self.limits().search);
+        let travel = target.search.min(self.limits.search);
 
-        let fast = line.direction * params.safe_speed().min(self.limits().speed);
+        let fast = line.direction * params.safe_speed().min(self.limits.speed);
         let mut contacts = 0;
         let mut reached = 0.0;
         let mut searched = |watched: &mut Self, doing, far: f64| {
@@ -104,7 +104,7 @@ impl Watched<'_> {
             self.halt("approaching", &mut |_| {})?;
             if !is_contact {
                 let pressed = self.press(target, params, room + at - gone, &mut states)?;
-                gone = self.last().map_or(gone, |state| line.depth(&state)).max(gone);
+                gone = self.last.map_or(gone, |state| line.depth(&state)).max(gone);
                 outcome = pressed.then(|| outcome_of(&line, params, &states));
             }
         }
@@ -125,15 +125,15 @@ impl Watched<'_> {
             }
         };
         // on the retraction the part may be in contact
-        self.line("retracting", &target.standoff_bt, params.link_speed, params, self.limits().force)?;
-        let ended = self.last().map_or(begun, |state| state.stamp_ns);
+        self.line("retracting", &target.standoff_bt, params.link_speed, params, self.limits.force)?;
+        let ended = self.last.map_or(begun, |state| state.stamp_ns);
         Ok(TouchRecord {
             target: *target,
             stamps_ns: [begun, ended],
             speed: params.measure_speed,
             curve: line.curve(&states),
             curve_ns: states.first().map_or(ended, |state| state.stamp_ns),
-            peak_force: self.peak_force(),
+            peak_force: self.peak_force,
             outcome,
         })
     }
@@ -143,7 +143,7 @@ impl Watched<'_> {
     /// No farther than the stand-off: whether it is free there.
     fn back_off(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<bool, ProbeError> {
         let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
-        let way_back = self.last().map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
+        let way_back = self.last.map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
         let mut free_at = None;
         let is_free = self.search("backing off", -slow * BACK, way_back, &mut |state| {
             if line.presses(state) < params.trigger * FREE {
@@ -179,7 +179,7 @@ impl Watched<'_> {
         if let Some(corner) =
             states.iter().find(|state| state.wrench_b.force.norm() > params.trigger).map(|at| line.depth(at))
         {
-            self.search("coming back from the surface", -slow, self.limits().search, &mut |state| {
+            self.search("coming back from the surface", -slow, self.limits.search, &mut |state| {
                 states.push(*state);
                 line.depth(state) < corner - params.back_off
             })?;
@@ -189,12 +189,12 @@ impl Watched<'_> {
     }
 
     fn slow(&self, target: &TouchTarget, params: &TouchParams) -> Vector3<f64> {
-        target.direction.into_inner() * params.measure_speed.min(params.safe_speed()).min(self.limits().speed)
+        target.direction.into_inner() * params.measure_speed.min(params.safe_speed()).min(self.limits.speed)
     }
 
     /// Force by which a search goes beyond where it is stopped, N.
     fn overshoot(&self, params: &TouchParams, speed: f64) -> f64 {
-        let acceleration = params.acceleration.min(self.limits().acceleration);
+        let acceleration = params.acceleration.min(self.limits.acceleration);
         let most = params.stiffness * speed * (params.latency + speed / (2.0 * acceleration));
         most.min(params.force - params.trigger)
     }

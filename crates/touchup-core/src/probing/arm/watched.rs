@@ -122,12 +122,12 @@ pub trait Observer {
 
 /// An arm that is watched while it moves.
 pub struct Watched<'a> {
-    arm: &'a mut dyn Arm,
-    limits: Limits,
+    pub(super) arm: &'a mut dyn Arm,
+    pub(super) limits: Limits,
     observer: &'a mut dyn Observer,
-    last: Option<ArmState>,
+    pub(super) last: Option<ArmState>,
     frozen: u32,
-    peak_force: f64,
+    pub(super) peak_force: f64,
 }
 
 impl<'a> Watched<'a> {
@@ -144,24 +144,6 @@ impl<'a> Watched<'a> {
     /// When the arm was seen last, by its clock, ns; `None` where it was not, or not since the sensor was zeroed.
     pub(crate) fn seen_ns(&self) -> Option<i64> {
         self.last.map(|state| state.stamp_ns)
-    }
-
-    /// Resets the largest force.
-    pub(super) fn forget_peak(&mut self) {
-        self.peak_force = 0.0;
-    }
-
-    pub(super) fn last(&self) -> Option<ArmState> {
-        self.last
-    }
-
-    pub(super) fn limits(&self) -> &Limits {
-        &self.limits
-    }
-
-    /// Of the arm, s.
-    pub(super) fn period(&self) -> f64 {
-        self.arm.period()
     }
 
     /// The next state, if it is valid.
