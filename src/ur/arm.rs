@@ -68,7 +68,7 @@ impl UrArm {
 
     /// Number of the process that speaks to the arm.
     pub fn client_id(&self) -> u32 {
-        self.client.id()
+        self.client.id
     }
 
     fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {

@@ -22,7 +22,8 @@ pub(super) struct Client {
     orders: Option<ChildStdin>,
     guard: Option<JoinHandle<Option<Halt>>>,
     halt: Option<Halt>,
-    id: u32,
+    /// of the process
+    pub id: u32,
 }
 
 impl Client {
@@ -44,7 +45,7 @@ impl Client {
         else {
             return Err(UrError::Client("has no pipes".to_owned()));
         };
-        let is_lock_step = params.is_lock_step && dashboard.is_lock_step();
+        let is_lock_step = params.is_lock_step && dashboard.is_lock_step;
         let begin = Begin {
             host: params.host.clone(),
             site_packages: params.site_packages.clone(),
@@ -152,37 +153,29 @@ impl Client {
         known.broken.as_ref().map_or(Ok(()), |broken| Err(broken.error()))
     }
 
-    /// Whether it can be spoken to.
-    pub fn is_broken(&self) -> bool {
-        self.shared.known().broken.is_some()
-    }
-
     /// Ends it, and with it the program of the controller; later calls return the reason.
     pub fn close(&mut self, reason: &str) {
         self.shared.known().close(self.shared.clock.now());
         // at the end of its stdin it brakes, ends the program of the controller and itself
         self.orders = None;
-        if let Some(guard) = self.guard.take() {
-            // a guard that failed has nothing more to say
-            self.halt = guard.join().ok().flatten();
-        }
+        self.end_guard();
         let closed = || ClientLoss::Arm(ArmError::Client { reason: reason.to_owned() });
         self.shared.known().broken.get_or_insert_with(closed);
     }
 
     /// How the guard stopped the arm, when it had to.
     pub fn halt(&mut self) -> Option<Halt> {
-        if self.is_broken()
-            && let Some(guard) = self.guard.take()
-        {
-            self.halt = guard.join().ok().flatten();
+        if self.shared.known().broken.is_some() {
+            self.end_guard();
         }
         self.halt
     }
 
-    /// Of the process.
-    pub fn id(&self) -> u32 {
-        self.id
+    fn end_guard(&mut self) {
+        if let Some(guard) = self.guard.take() {
+            // a guard that failed has nothing more to say
+            self.halt = guard.join().ok().flatten();
+        }
     }
 }
 

@@ -16,8 +16,10 @@ const LOCK_STEP: &str = "in lock step";
 pub(super) struct Dashboard {
     host: String,
     replies: BufReader<TcpStream>,
-    is_lock_step: bool,
-    is_silent: bool,
+    /// whether this is a simulated controller whose clock waits for its client
+    pub is_lock_step: bool,
+    /// whether it did not answer in time; not that it has closed the connection
+    pub is_silent: bool,
 }
 
 impl Dashboard {
@@ -30,16 +32,6 @@ impl Dashboard {
             Self { host: host.to_owned(), replies: BufReader::new(socket), is_lock_step: false, is_silent: false };
         dashboard.is_lock_step = dashboard.line()?.ends_with(LOCK_STEP);
         Ok(dashboard)
-    }
-
-    /// Whether this is a simulated controller whose clock waits for its client.
-    pub fn is_lock_step(&self) -> bool {
-        self.is_lock_step
-    }
-
-    /// Whether it did not answer in time; not that it has closed the connection.
-    pub fn is_silent(&self) -> bool {
-        self.is_silent
     }
 
     fn unreachable(&self, reason: impl ToString) -> UrError {

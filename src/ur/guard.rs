@@ -136,10 +136,6 @@ impl GuardState {
         self.closing_since = Some(now);
     }
 
-    pub fn is_closing(&self) -> bool {
-        self.closing_since.is_some()
-    }
-
     /// Whether the program of the controller does not run, for long enough that the reason would have arrived.
     pub fn has_ended(&self, now: Instant) -> bool {
         self.ended_since.is_some_and(|since| now.saturating_duration_since(since) > ENDED)
@@ -255,7 +251,7 @@ impl Guard {
                     broken
                 }
                 // it ended on request
-                Err(RecvTimeoutError::Disconnected) if self.shared.known().is_closing() => break None,
+                Err(RecvTimeoutError::Disconnected) if self.shared.known().closing_since.is_some() => break None,
                 Err(RecvTimeoutError::Timeout) => Some(self.shared.known().missed()),
                 Err(RecvTimeoutError::Disconnected) => {
                     let end = self.child.wait().map_or_else(|error| error.to_string(), |status| status.to_string());
@@ -287,7 +283,7 @@ impl Guard {
         let (host, deadline) = (&self.host, self.shared.known().deadlines.dashboard);
         let stopped = self.dashboard.stop().or_else(|error| {
             // one that was closed, not one that is silent, may be there again
-            if self.dashboard.is_silent() { Err(error) } else { Dashboard::connect(host, deadline)?.stop() }
+            if self.dashboard.is_silent { Err(error) } else { Dashboard::connect(host, deadline)?.stop() }
         });
         match stopped {
             Ok(()) => Halt::Dashboard { took: self.shared.clock.since(begun) },
