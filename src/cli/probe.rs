@@ -1,7 +1,6 @@
 //! `touchup probe`: an arm probes flagged features by itself, without ROS.
 
 use std::fmt;
-use std::ops::Range;
 use std::path::PathBuf;
 
 use clap::Args;

@@ -300,7 +300,7 @@ mod tests {
     fn what_cannot_be_made_is_named_a_touch_or_a_slide() {
         let held_back = [(PlannedMotion::Touch(2), "too far"), (PlannedMotion::Slide(0), "too low")];
         let held_back = held_back.map(|(what, why)| HeldBack { what, why: why.to_owned() }).to_vec();
-        let target = ProbeTarget { id: 7, kind: None, place: Point3::origin(), radius: 3e-3 };
+        let target = Flag { id: 7, kind: None, place: Point3::origin(), radius: 3e-3 };
         let result = planned(&target, &Plan { held_back, ..Plan::default() });
         assert_eq!(result.code, ProbeResult::OUT_OF_LIMITS);
         assert_eq!(result.message, "touch 2: too far; slide 0: too low");
