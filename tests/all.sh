@@ -104,11 +104,6 @@ cargo_tests() {
   while read -r line; do fail "$line"; done < "$log.failed"
 }
 
-# the node on r2r has its own build, of which without ROS only the tests of its parts can run
-r2r_tests() {
-  cargo_tests "$logs/rust_r2r.log" "${unoptimised[@]}" --no-default-features --features r2r-check --lib ros::r2r
-}
-
 python_tests() {
   export TOUCHUP_BIN=$target/debug/touchup
   if [ "${#ur[@]}" -gt 0 ]; then
@@ -149,9 +144,9 @@ programs=(--test rooms --test report)
 [ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
 stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${ur[@]}" "${programs[@]}"
-stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --lib --bins
+# with them the node on r2r, of which without ROS only its parts can run
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --features r2r-check --lib --bins
 stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
-stage "r2r" r2r_tests
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
 elif stage "Python packages" python_environment && [ -e "$venv.made" ]; then

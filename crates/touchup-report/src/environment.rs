@@ -1,9 +1,11 @@
 //! The peers of the report: a virtual environment with libraries from PyPI, and one process in it.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use touchup_core::haptic::RefineError;
+use touchup_io::atomic::write_atomically;
 use touchup_report::Effort;
 use touchup_report::peers::{PACKAGES, Peers, PeersAtSize, PeersInput, SCRIPT, UnknownLine};
 
@@ -78,7 +80,7 @@ fn run_script(python: &Path, input: &PeersInput) -> Result<String, PeersError> {
     let folder = tempfile::tempdir().map_err(write_error(std::env::temp_dir()))?;
     for (name, bytes) in input.files() {
         let path = folder.path().join(name);
-        std::fs::write(&path, bytes).map_err(write_error(path))?;
+        write_atomically(&path, |to| to.write_all(&bytes)).map_err(write_error(path))?;
     }
     let mut command = Command::new(python);
     command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances.len().to_string());

@@ -2,6 +2,7 @@
 
 mod closest;
 mod coherent;
+mod ids;
 mod journal;
 mod region;
 mod repair;
@@ -13,11 +14,12 @@ mod workers;
 
 pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
 pub(crate) use coherent::coherent_order;
+pub use ids::{FaceId, VertexId};
 pub use journal::{Changes, IdSet};
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub(crate) use signed_distance::corner_normal;
 pub use signed_distance::{pseudo_normal, signed_distance};
-pub use tri_mesh::{FaceId, MeshError, TriMesh, VertexId};
+pub use tri_mesh::{MeshError, TriMesh};
 pub(crate) use workers::map_by;
 pub use workers::{Alone, Job, Workers};

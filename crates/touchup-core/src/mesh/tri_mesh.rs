@@ -4,19 +4,12 @@ use nalgebra::{Point3, Vector3};
 
 use super::journal::{Changes, Journal};
 use super::stars::{MOST_FACES, Stars, Valences};
+use super::{FaceId, VertexId};
 
 /// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;
 /// Vertices that ids can name.
 const MOST_VERTICES: usize = REMOVED as usize - 1;
-
-/// A face of one [`TriMesh`]; stays valid until that face is removed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct FaceId(pub u32);
-
-/// A vertex of one [`TriMesh`]; stays valid until that vertex is removed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct VertexId(pub u32);
 
 /// What makes a triangle soup unusable as a [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
