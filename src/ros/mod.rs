@@ -20,7 +20,7 @@ mod send_queue;
 mod services;
 mod topics;
 
-#[cfg(all(feature = "ros", not(feature = "r2r")))]
+#[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
 pub use dds::{samples, start};
 pub use exchange::RosError;
 
@@ -28,5 +28,5 @@ pub use exchange::RosError;
 fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
-#[cfg(feature = "r2r")]
+#[cfg(all(feature = "r2r", not(all(feature = "ros", feature = "r2r-check"))))]
 pub use r2r::{samples, start};

@@ -130,8 +130,7 @@ impl Scene {
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
         // comments between a key and its value are held, and there are few places for them
-        let options = serde_saphyr::options! { emit_comments: false };
-        let scene: Self = serde_saphyr::from_str_with_options(yaml, options).map_err(|error| yaml_error(&error))?;
+        let scene: Self = serde_saphyr::from_str(yaml).map_err(|error| yaml_error(&error))?;
         scene.validate()?;
         Ok(scene)
     }
