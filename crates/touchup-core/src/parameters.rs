@@ -611,7 +611,39 @@ macro_rules! parameters {
     };
 }
 
-/// Declares an enum of words that a key may hold.
+/// Declares an enum whose variants have names: `ALL`, `name` and `Display`.
+#[macro_export]
+macro_rules! names {
+    (
+        $(#[$meta:meta])*
+        pub enum $Name:ident { $($(#[$one_meta:meta])* $One:ident = $name:literal),* $(,)? }
+    ) => {
+        $(#[$meta])*
+        pub enum $Name {
+            $($(#[$one_meta])* $One,)*
+        }
+
+        impl $Name {
+            /// Each, in their order.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$One),*];
+
+            /// As it is written, in files and for people.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$One => $name,)*
+                }
+            }
+        }
+
+        impl ::std::fmt::Display for $Name {
+            fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+    };
+}
+
+/// Declares an enum of words that a key may hold, with [`names!`](crate::names!).
 ///
 /// ```
 /// touchup_core::words! {
@@ -625,7 +657,7 @@ macro_rules! parameters {
 ///         Counter = "ccw",
 ///     }
 /// }
-/// assert_eq!(Turn::default().word(), "cw");
+/// assert_eq!(Turn::default().name(), "cw");
 /// ```
 #[macro_export]
 macro_rules! words {
@@ -633,18 +665,11 @@ macro_rules! words {
         $(#[$meta:meta])*
         pub enum $Name:ident { $($(#[$word_meta:meta])* $Word:ident = $word:literal),* $(,)? }
     ) => {
-        $(#[$meta])*
-        #[derive(::serde::Deserialize)]
-        pub enum $Name {
-            $($(#[$word_meta])* #[serde(rename = $word)] $Word,)*
-        }
-
-        impl $Name {
-            /// As it is written.
-            pub fn word(self) -> &'static str {
-                match self {
-                    $(Self::$Word => $word,)*
-                }
+        $crate::names! {
+            $(#[$meta])*
+            #[derive(::serde::Deserialize)]
+            pub enum $Name {
+                $($(#[$word_meta])* #[serde(rename = $word)] $Word = $word,)*
             }
         }
 
@@ -657,7 +682,7 @@ macro_rules! words {
             }
 
             fn yaml(&self, _: $crate::parameters::Unit) -> Option<String> {
-                Some(self.word().to_owned())
+                Some(self.name().to_owned())
             }
         }
     };

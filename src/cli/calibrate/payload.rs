@@ -146,7 +146,7 @@ impl PayloadFound {
             Setting::scalar(&key("mass_kg"), mass_kg),
             Setting::list(&key("centre_mm"), &centre_mm),
             Setting::list(&key("gravity_m_per_s2"), &gravity_m_per_s2),
-            Setting::scalar(&key("gravity_axes"), GravityAxes::Space.word()),
+            Setting::scalar(&key("gravity_axes"), GravityAxes::Space.name()),
             Setting::list(&["compensation", "bias", "force_n"], &force_n),
             Setting::list(&["compensation", "bias", "torque_nm"], &torque_nm),
         ];

@@ -3,35 +3,26 @@
 use nalgebra::{Point3, Vector3};
 
 use super::fit::{Cylinder, Stadium};
+use crate::names;
 
-/// What a feature is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
-    /// round, through or blind; a stepped one is several of one group
-    Hole,
-    /// between two parallel walls
-    Slot,
-    /// closed all around, with a floor
-    Pocket,
-    /// round, standing on a plane
-    Boss,
-    /// straight, between two planes
-    Edge,
-    /// where three planes meet
-    Corner,
-    /// flat
-    Plane,
-}
-
-impl Kind {
-    /// Every one.
-    pub const ALL: [Kind; 7] =
-        [Self::Hole, Self::Slot, Self::Pocket, Self::Boss, Self::Edge, Self::Corner, Self::Plane];
-
-    /// As files name it.
-    pub fn name(self) -> &'static str {
-        // in the order of `ALL`
-        ["hole", "slot", "pocket", "boss", "edge", "corner", "plane"][self as usize]
+names! {
+    /// What a feature is.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Kind {
+        /// round, through or blind; a stepped one is several of one group
+        Hole = "hole",
+        /// between two parallel walls
+        Slot = "slot",
+        /// closed all around, with a floor
+        Pocket = "pocket",
+        /// round, standing on a plane
+        Boss = "boss",
+        /// straight, between two planes
+        Edge = "edge",
+        /// where three planes meet
+        Corner = "corner",
+        /// flat
+        Plane = "plane",
     }
 }
 

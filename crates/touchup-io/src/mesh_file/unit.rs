@@ -14,7 +14,7 @@ pub const SMALLEST_M: f64 = 1e-3;
 pub const LARGEST_M: f64 = 20.0;
 
 words! {
-    /// The unit in which a mesh file gives its coordinates.
+    /// The unit in which a mesh file gives its coordinates; the commonest first, as they are suggested.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
     pub enum MeshUnit {
         /// 1 m
@@ -31,9 +31,6 @@ words! {
 }
 
 impl MeshUnit {
-    /// The commonest first: so they are suggested.
-    const ALL: [Self; 3] = [Self::Metre, Self::Millimetre, Self::Inch];
-
     /// Length of the unit, m.
     pub const fn metres(self) -> f64 {
         match self {
@@ -49,12 +46,6 @@ impl MeshUnit {
             Self::Millimetre => "millimetres",
             Self::Inch => "inches",
         }
-    }
-}
-
-impl fmt::Display for MeshUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
     }
 }
 

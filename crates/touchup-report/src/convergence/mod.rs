@@ -12,16 +12,19 @@ pub(super) use sweeps::region_over;
 pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, SweepError, noisy, raster_samples};
 
 use super::Effort;
+use touchup_core::names;
 use touchup_core::stylus::Sample;
 use touchup_sim::Peaks;
 
-/// Which rule made the sweeps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// the published one, 20 s on each face, faces compared by index
-    Paper,
-    /// the repaired one, one raster a sweep, compared with the surface
-    Robust,
+names! {
+    /// Which rule made the sweeps.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Rule {
+        /// the published one, 20 s on each face, faces compared by index
+        Paper = "published rule",
+        /// the repaired one, one raster a sweep, compared with the surface
+        Robust = "robust mode",
+    }
 }
 
 /// The sweeps over one scan.

@@ -7,25 +7,16 @@ use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
 /// Points of a drawn law between two sweeps.
 const STEPS: usize = 8;
 
-impl Rule {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "published rule",
-            Self::Robust => "robust mode",
-        }
-    }
-}
-
 impl Convergence {
     /// As a part of the report.
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![self.introduction()];
-        text.extend([Rule::Paper, Rule::Robust].into_iter().map(|rule| self.verdict(rule)));
+        text.extend(Rule::ALL.into_iter().map(|rule| self.verdict(rule)));
         text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
         Chapter {
             title: "Convergence from sweep to sweep".to_owned(),
             text,
-            figures: vec![self.figure(Rule::Paper), self.figure(Rule::Robust)],
+            figures: Rule::ALL.map(|rule| self.figure(rule)).into(),
             tables: vec![self.table()],
         }
     }

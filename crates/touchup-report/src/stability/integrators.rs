@@ -4,6 +4,7 @@ use nalgebra::{Matrix4, Vector3, Vector4};
 
 use touchup_core::haptic::dynamics::{LARGEST_SHARE, turn};
 use touchup_core::haptic::{ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::names;
 
 /// Most Newton iterations of the implicit step.
 const NEWTON_STEPS: usize = 50;
@@ -12,21 +13,23 @@ const NEWTON_TOLERANCE: f64 = 1e-12;
 /// Differences for its Jacobian: half of the digits.
 const DIFFERENCE: f64 = 1e-8;
 
-/// An integrator that advances a face by one sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Integrator {
-    /// one explicit Euler step a sample
-    ExplicitEuler,
-    /// one classical Runge–Kutta step of order 4 a sample
-    RungeKutta4,
-    /// adaptive Runge–Kutta 5(4), as many steps as it takes, up to 20,000
-    DormandPrince,
-    /// one implicit Euler step a sample, solved by Newton's method
-    ImplicitEuler,
-    /// the exact flow of the position, then that of the normal: the default
-    Lie,
-    /// the same with the drift of one in the other
-    DriftCorrected,
+names! {
+    /// An integrator that advances a face by one sample.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Integrator {
+        /// one explicit Euler step a sample
+        ExplicitEuler = "explicit Euler",
+        /// one classical Runge–Kutta step of order 4 a sample
+        RungeKutta4 = "RK4",
+        /// adaptive Runge–Kutta 5(4), as many steps as it takes, up to 20,000
+        DormandPrince = "Dormand-Prince 5(4)",
+        /// one implicit Euler step a sample, solved by Newton's method
+        ImplicitEuler = "implicit Euler",
+        /// the exact flow of the position, then that of the normal: the default
+        Lie = "Lie",
+        /// the same with the drift of one in the other
+        DriftCorrected = "drift-corrected",
+    }
 }
 
 /// One sample, held.
@@ -43,41 +46,26 @@ pub(super) struct HeldSample {
 }
 
 impl Integrator {
-    /// All of them, the simplest first.
-    pub const ALL: [Self; 6] = [
-        Self::ExplicitEuler,
-        Self::RungeKutta4,
-        Self::DormandPrince,
-        Self::ImplicitEuler,
-        Self::Lie,
-        Self::DriftCorrected,
-    ];
-
-    /// As a person reads it, as the end of a file name, and its counterpart in [`FaceDynamics`].
-    fn facts(self) -> (&'static str, &'static str, Option<StepRule>) {
+    /// The end of a file name, and its counterpart in [`FaceDynamics`].
+    fn facts(self) -> (&'static str, Option<StepRule>) {
         match self {
-            Self::ExplicitEuler => ("explicit Euler", "explicit_euler", None),
-            Self::RungeKutta4 => ("RK4", "rk4", None),
-            Self::DormandPrince => ("Dormand-Prince 5(4)", "dormand_prince", Some(StepRule::DormandPrince)),
-            Self::ImplicitEuler => ("implicit Euler", "implicit_euler", None),
-            Self::Lie => ("Lie", "lie", Some(StepRule::Lie)),
-            Self::DriftCorrected => ("drift-corrected", "drift_corrected", Some(StepRule::DriftCorrected)),
+            Self::ExplicitEuler => ("explicit_euler", None),
+            Self::RungeKutta4 => ("rk4", None),
+            Self::DormandPrince => ("dormand_prince", Some(StepRule::DormandPrince)),
+            Self::ImplicitEuler => ("implicit_euler", None),
+            Self::Lie => ("lie", Some(StepRule::Lie)),
+            Self::DriftCorrected => ("drift_corrected", Some(StepRule::DriftCorrected)),
         }
-    }
-
-    /// As a person reads it.
-    pub fn name(self) -> &'static str {
-        self.facts().0
     }
 
     /// As the end of a file name.
     pub fn id(self) -> &'static str {
-        self.facts().1
+        self.facts().0
     }
 
     /// Its counterpart in [`FaceDynamics`], if any.
     pub fn rule(self) -> Option<StepRule> {
-        self.facts().2
+        self.facts().1
     }
 
     /// The travel along the force, m, and the normal, whatever its length, after one sample; `None` where it gives up.

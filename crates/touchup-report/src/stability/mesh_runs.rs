@@ -7,6 +7,7 @@ use rand_pcg::Pcg64;
 use super::face_runs::{RunEnding, goes_over, log_uniform};
 use touchup_core::haptic::{RefineParams, Refiner, RegionFit, TipParams};
 use touchup_core::mesh::{FaceId, TriMesh};
+use touchup_core::names;
 use touchup_core::stylus::{Sample, Wrench};
 
 /// Cells along each side of the sheet.
@@ -22,25 +23,14 @@ const CROSSING: f64 = 1e-9;
 /// Decades of the quality: from one in a thousand to one.
 pub(super) const QUALITY: std::ops::Range<f64> = -3.0..0.0;
 
-/// How a triangle is degenerate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BadShape {
-    /// two long sides and a short one
-    Needle,
-    /// one long side and two that lie on it nearly
-    Sliver,
-}
-
-impl BadShape {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Needle, Self::Sliver];
-
-    /// As a person reads it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Needle => "needles",
-            Self::Sliver => "slivers",
-        }
+names! {
+    /// How a triangle is degenerate.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum BadShape {
+        /// two long sides and a short one
+        Needle = "needles",
+        /// one long side and two that lie on it nearly
+        Sliver = "slivers",
     }
 }
 

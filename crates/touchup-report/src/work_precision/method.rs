@@ -9,27 +9,30 @@ use super::{explicit, rosenbrock};
 use crate::Effort;
 use touchup_core::haptic::dynamics::dormand_prince;
 use touchup_core::haptic::{FaceDynamics, FaceState, StepRule};
+use touchup_core::names;
 
 /// A Jacobian has four columns: what it would cost by differences.
 const JACOBIAN_COUNTS: u64 = 4;
 /// The flow, and twice the flow with drift.
 const FLOWS_CORRECTED: u64 = 3;
 
-/// An integrator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// explicit Euler, fixed step
-    Euler,
-    /// classical Runge–Kutta of order 4, fixed step
-    RungeKutta,
-    /// Dormand–Prince 5(4), adaptive: ode45's pair
-    DormandPrince,
-    /// RODAS 4(3), adaptive: implicit, L-stable
-    Rodas,
-    /// touchup's exact position flow, then its exact rotation
-    Lie,
-    /// the same with the drift that the rotation causes
-    DriftCorrected,
+names! {
+    /// An integrator.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Method {
+        /// explicit Euler, fixed step
+        Euler = "explicit Euler",
+        /// classical Runge–Kutta of order 4, fixed step
+        RungeKutta = "RK4",
+        /// Dormand–Prince 5(4), adaptive: ode45's pair
+        DormandPrince = "Dormand–Prince 5(4)",
+        /// RODAS 4(3), adaptive: implicit, L-stable
+        Rodas = "RODAS 4(3), implicit",
+        /// touchup's exact position flow, then its exact rotation
+        Lie = "Lie, exact flows",
+        /// the same with the drift that the rotation causes
+        DriftCorrected = "drift-corrected",
+    }
 }
 
 /// The setting that controls its accuracy.
@@ -51,22 +54,6 @@ pub struct Solved {
 }
 
 impl Method {
-    /// In the order of legends.
-    pub const ALL: [Self; 6] =
-        [Self::Euler, Self::RungeKutta, Self::DormandPrince, Self::Rodas, Self::Lie, Self::DriftCorrected];
-
-    /// As in legends.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Euler => "explicit Euler",
-            Self::RungeKutta => "RK4",
-            Self::DormandPrince => "Dormand–Prince 5(4)",
-            Self::Rodas => "RODAS 4(3), implicit",
-            Self::Lie => "Lie, exact flows",
-            Self::DriftCorrected => "drift-corrected",
-        }
-    }
-
     /// Whether it is one of touchup's own.
     pub fn is_exact(self) -> bool {
         matches!(self, Self::Lie | Self::DriftCorrected)

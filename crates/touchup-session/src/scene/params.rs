@@ -36,7 +36,7 @@ impl Scene {
         let (robot, TipParams { radius: ball_radius, stiffness }) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
         let RobotSection { limits, touch, pattern, tool, .. } = robot;
         let cell = Cell {
-            geometry: UrGeometry::of(robot.model.word())?,
+            geometry: UrGeometry::of(robot.model.name())?,
             pose_bo: self.scan_to_space.as_ref().map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
             pose_ft: robot.pose_ft(),
             tool: Tool { ball_radius, ..*tool },

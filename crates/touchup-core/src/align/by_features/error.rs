@@ -1,25 +1,17 @@
 //! Why features determine no motion, or more than one.
 
-use std::fmt;
-
 use super::FreeTurn;
 use super::alternative::Alternative;
+use crate::names;
 
-/// Which of the two shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FeaturesSide {
-    /// what is to be moved: the mesh
-    Source,
-    /// what it is moved onto: the true part
-    Target,
-}
-
-impl fmt::Display for FeaturesSide {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Source => "mesh",
-            Self::Target => "truth",
-        })
+names! {
+    /// Which of the two shapes.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum FeaturesSide {
+        /// what is to be moved: the mesh
+        Source = "mesh",
+        /// what it is moved onto: the true part
+        Target = "truth",
     }
 }
 

@@ -1,20 +1,15 @@
 //! What can be wrong with picked pairs.
 
-/// Which of the two points of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PairSide {
-    /// Before the motion: the scan.
-    From,
-    /// After it: space.
-    To,
-}
+use crate::names;
 
-impl std::fmt::Display for PairSide {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::From => "scan",
-            Self::To => "space",
-        })
+names! {
+    /// Which of the two points of a pair.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum PairSide {
+        /// Before the motion: the scan.
+        From = "scan",
+        /// After it: space.
+        To = "space",
     }
 }
 

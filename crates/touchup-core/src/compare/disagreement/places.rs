@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::edges::SharpEdges;
 use crate::compare::IndexedMesh;
+use crate::names;
 
 /// The source of a vertex of a refined mesh, as `refine` writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,47 +26,31 @@ pub struct RefinedShape<'a> {
     pub known: &'a [VertexBasis],
 }
 
-/// What a place is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
-    /// scan and touch agree within the noise of the scan
-    Agrees,
-    /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
-    ScannerError,
-    /// the part is not what was scanned
-    ChangedPart,
-    /// the touch is wrong
-    BadTouch,
-    /// may be changed as well as the scanner's error
-    Unsure,
-    /// nothing is known but the scan
-    NeverTouched,
-    /// the ball does not get there
-    Unreachable,
+names! {
+    /// What a place is.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Class {
+        /// scan and touch agree within the noise of the scan
+        Agrees = "agrees",
+        /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
+        ScannerError = "scanner error",
+        /// the part is not what was scanned
+        ChangedPart = "changed part",
+        /// the touch is wrong
+        BadTouch = "bad touch",
+        /// may be changed as well as the scanner's error
+        Unsure = "unsure",
+        /// nothing is known but the scan
+        NeverTouched = "never touched",
+        /// the ball does not get there
+        Unreachable = "unreachable",
+    }
 }
 
 impl Class {
-    /// All, in the order of the report.
-    pub const ALL: [Self; 7] = [
-        Self::Agrees,
-        Self::ScannerError,
-        Self::ChangedPart,
-        Self::BadTouch,
-        Self::Unsure,
-        Self::NeverTouched,
-        Self::Unreachable,
-    ];
-
     /// Whether a touch says something of it.
     pub(super) fn is_touched(self) -> bool {
         !matches!(self, Self::NeverTouched | Self::Unreachable)
-    }
-
-    /// As the report names it.
-    pub fn name(self) -> &'static str {
-        // in the order of `ALL`
-        ["agrees", "scanner error", "changed part", "bad touch", "unsure", "never touched", "unreachable"]
-            [self as usize]
     }
 }
 

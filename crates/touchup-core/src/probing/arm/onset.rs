@@ -11,7 +11,7 @@
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
 use crate::numeric::{DampedSearch, NormalEquations, SearchEnd, median};
-use crate::parameters;
+use crate::{names, parameters};
 
 /// One moment of a touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,31 +48,20 @@ parameters! {
     }
 }
 
-/// The class of the curve of a touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnsetVerdict {
-    /// One line in free air, one in contact, the same in and out.
-    Clean,
-    /// Going in and coming out differ: the tip slipped sideways or the part yielded.
-    Slip,
-    /// Much of the force was across the approach: an edge, or a slope.
-    Edge,
-    /// Contact was lost and found again going in.
-    Bounce,
-    /// A short push that was no contact: something hit the arm or the table.
-    Impact,
-}
-
-impl OnsetVerdict {
-    /// In one word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Clean => "clean",
-            Self::Slip => "slip",
-            Self::Edge => "edge",
-            Self::Bounce => "bounce",
-            Self::Impact => "impact",
-        }
+names! {
+    /// The class of the curve of a touch.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum OnsetVerdict {
+        /// One line in free air, one in contact, the same in and out.
+        Clean = "clean",
+        /// Going in and coming out differ: the tip slipped sideways or the part yielded.
+        Slip = "slip",
+        /// Much of the force was across the approach: an edge, or a slope.
+        Edge = "edge",
+        /// Contact was lost and found again going in.
+        Bounce = "bounce",
+        /// A short push that was no contact: something hit the arm or the table.
+        Impact = "impact",
     }
 }
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use crate::features::fit::Observation;
 use crate::features::{End, Kind};
-use crate::parameters;
+use crate::{names, parameters};
 
 parameters! {
     /// What is known and wanted of a flagged feature.
@@ -37,37 +37,27 @@ parameters! {
     }
 }
 
-/// A number of a feature.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Quantity {
-    /// place and sizes: every length
-    #[default]
-    All,
-    /// where it is
-    Position,
-    /// the direction of its axis, of an edge its line, of a plane its normal; rad
-    Axis,
-    /// of a hole or boss
-    Diameter,
-    /// of a slot
-    Length,
-    /// of a slot
-    Width,
+names! {
+    /// A number of a feature.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Quantity {
+        /// place and sizes: every length
+        #[default]
+        All = "every length",
+        /// where it is
+        Position = "position",
+        /// the direction of its axis, of an edge its line, of a plane its normal; rad
+        Axis = "axis",
+        /// of a hole or boss
+        Diameter = "diameter",
+        /// of a slot
+        Length = "length",
+        /// of a slot
+        Width = "width",
+    }
 }
 
 impl Quantity {
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::All => "every length",
-            Self::Position => "position",
-            Self::Axis => "axis",
-            Self::Diameter => "diameter",
-            Self::Length => "length",
-            Self::Width => "width",
-        }
-    }
-
     /// Whether a feature has it.
     pub fn is_of(self, kind: Option<Kind>) -> bool {
         match self {
