@@ -65,9 +65,9 @@ impl Feature {
         // a plane that leans along the edge takes the edge with it
         let leans = sides.map(|side| {
             let along = side.surface.pose_of.inverse_transform_vector(&axis.value);
-            side.estimate(0.0, &[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
+            side.std_by(&[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
         });
-        axis.std = leans[0].zip(leans[1]).map(|(a, b)| a.std.hypot(b.std) / sine);
+        axis.std = leans[0].zip(leans[1]).map(|(a, b)| a.hypot(b) / sine);
         Some(Self { axis: Some(axis), ..edge })
     }
 
@@ -127,7 +127,7 @@ pub(super) fn axis_of<S: Surface>(fit: &Fit<S>, out: &Vector3<f64>, touches: &To
 
 /// A number with its derivatives by the freedoms.
 pub(super) fn number<S: Surface>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)], touches: &Touches) -> Measured<f64> {
-    Measured { value, std: fit.estimate(value, by).map(|estimate| estimate.std), touches: touches.clone() }
+    Measured { value, std: fit.std_by(by), touches: touches.clone() }
 }
 
 /// Distance of a place from a plane, m.

@@ -197,7 +197,6 @@ impl<S: Surface> Fitted<S> {
 
     /// A fitted number, or its value without a fit.
     pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
-        let estimate = self.fit.as_ref().and_then(|fit| fit.estimate(value, by));
-        Measured { value, std: estimate.map(|estimate| estimate.std), touches: self.touches.clone() }
+        Measured { value, std: self.fit.as_ref().and_then(|fit| fit.std_by(by)), touches: self.touches.clone() }
     }
 }

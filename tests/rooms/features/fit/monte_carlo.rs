@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use touchup::features::fit::{Cone, Fit, FitParams, Freedom, Plane, SigmaFrom, Surface, fit};
+use touchup::features::fit::{Cone, Fit, FitParams, Freedom, Plane, Surface, fit};
 
 use super::*;
 
@@ -119,7 +119,6 @@ fn sigmas_stated_too_small_are_found_out() {
         let mut touched = noisy(&exact, &mut rng, 0.0, 0.03);
         touched.iter_mut().for_each(|o| o.sigma = 0.01);
         let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
-        assert_eq!(fit.sigma_from, SigmaFrom::Residuals);
         z.extend(normalised(&fit, 1.0));
     }
     assert!((0.8..1.25).contains(&rms(&z)), "{}", rms(&z));
@@ -144,13 +143,14 @@ fn planes_and_cones_are_right_in_the_mean_and_say_how_well() {
         let guess =
             Cone::new(Point3::new(0.05, 0.0, 0.0), &Vector3::new(0.02, 0.0, 1.0), 1.05, half_angle + 0.05, true);
         let cone = fit(&guess, &touched, &FitParams::default()).unwrap();
-        let full = cone.full_angle().unwrap();
         angles.push(cone.surface.half_angle - half_angle);
-        of_cone.push((cone.surface.half_angle - half_angle) / (full.std / 2.0));
+        of_cone.push((cone.surface.half_angle - half_angle) / cone.std(Freedom::Second).unwrap());
         // its diameter where its axis passes z = 0 of the true one
         let height = -cone.surface.center().z / cone.surface.axis().z;
-        let diameter = cone.diameter_at(height).unwrap();
-        of_cone.push((diameter.value - 2.0) / diameter.std);
+        let cos = cone.surface.half_angle.cos();
+        let by = [(Freedom::Size, 2.0 / cos), (Freedom::Second, 2.0 * height / (cos * cos))];
+        let radius = cone.surface.radius + height * cone.surface.half_angle.tan();
+        of_cone.push((2.0 * radius - 2.0) / cone.std_by(&by).unwrap());
 
         let flat: Vec<_> =
             exact.iter().map(|o| Observation { point: Point3::new(o.point.x, o.point.y, 0.0), ..*o }).collect();
@@ -177,6 +177,6 @@ fn a_common_error_goes_into_the_radius_and_not_into_the_axis() {
     let added = |f| with.std(f).unwrap().powi(2) - without.std(f).unwrap().powi(2);
     assert!((added(Freedom::Size) / 1e-4 - 1.0).abs() < 1e-6);
     assert!(Freedom::ALL[..6].iter().filter(|f| without.std(**f).is_some()).all(|f| added(*f).abs() < 1e-10));
-    let [without, with] = [without, with].map(|f| f.diameter().unwrap().std);
+    let [without, with] = [without, with].map(|f| f.std_by(&[(Freedom::Size, 2.0)]).unwrap());
     assert!(((with.powi(2) - without.powi(2)).sqrt() - 0.02).abs() < 1e-7, "twice in the diameter");
 }

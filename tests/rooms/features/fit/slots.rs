@@ -1,6 +1,6 @@
 //! Slots touched all around, and in part.
 
-use touchup::features::fit::{Ends, FitParams, Freedom, Stadium, Surface, fit};
+use touchup::features::fit::{Ends, Fit, FitParams, Freedom, Stadium, Surface, fit};
 
 use super::*;
 
@@ -51,9 +51,9 @@ fn width_length_and_centre_are_right_in_the_mean_and_say_how_well() {
         for seed in 0..300 {
             let touched = touches(&mut generator(seed), ends, &places);
             let fit = fit(&guess(ends), &touched, &FitParams::default()).unwrap();
-            let (slot, [width, length]) = (&fit.surface, [fit.width(), fit.length()].map(Option::unwrap));
-            z[0].push((width.value - WIDTH) / width.std);
-            z[1].push((length.value - LENGTH) / length.std);
+            let slot = &fit.surface;
+            z[0].push((slot.width - WIDTH) / fit.std(Freedom::Size).unwrap());
+            z[1].push((slot.length - LENGTH) / fit.std(Freedom::Second).unwrap());
             let at_0 = slot.center() - slot.axis() * (slot.center().z / slot.axis().z);
             z[2].push(at_0.x / fit.std(Freedom::X).unwrap());
             z[3].push(at_0.y / fit.std(Freedom::Y).unwrap());
@@ -74,25 +74,27 @@ fn what_was_not_touched_is_undetermined() {
     let walls = [(Wall(1.0), 30), (Wall(-1.0), 30)];
     let open = |places: &[(Place, u32)], ends| {
         let fit = fit(&guess(ends), &touches(&mut generator(3), ends, places), &FitParams::default()).unwrap();
-        (fit.undetermined(), fit)
+        let is_open = |f: &Freedom| Stadium::FREE[*f as usize] && fit.std(*f).is_none();
+        (Freedom::ALL.into_iter().filter(is_open).collect::<Vec<_>>(), fit)
     };
+    // how far the end in a direction along x of F is from the origin of F
+    let end_std = |fit: &Fit<Stadium>, sign: f64| fit.std_by(&[(Freedom::X, sign), (Freedom::Second, 0.5)]);
     for ends in [Ends::Round, Ends::Straight] {
         // walls do not show whether they lean along themselves; an end does
         let (undetermined, of_walls) = open(&walls, ends);
         assert_eq!(undetermined, [Freedom::X, Freedom::TiltX, Freedom::Second], "{ends:?}");
-        assert_eq!((of_walls.length(), of_walls.end(1.0)), (None, None));
-        assert!((of_walls.width().unwrap().value - WIDTH).abs() < 4.0 * of_walls.width().unwrap().std);
+        assert_eq!(end_std(&of_walls, 1.0), None);
+        assert!((of_walls.surface.width - WIDTH).abs() < 4.0 * of_walls.std(Freedom::Size).unwrap());
 
         let (undetermined, one_end) = open(&[walls[0], walls[1], (End(1.0), 20)], ends);
         assert_eq!(undetermined, [Freedom::X, Freedom::Second], "{ends:?}");
-        let end = one_end.end(1.0).unwrap();
-        let x = one_end.surface.center().x + end.value;
-        assert!((x - LENGTH / 2.0).abs() < 4.0 * end.std.max(SIGMA / 4.0), "{ends:?}: {x}");
-        assert_eq!((one_end.end(-1.0), one_end.length()), (None, None));
+        let x = one_end.surface.center().x + one_end.surface.length / 2.0;
+        let std = end_std(&one_end, 1.0).unwrap();
+        assert!((x - LENGTH / 2.0).abs() < 4.0 * std.max(SIGMA / 4.0), "{ends:?}: {x}");
+        assert_eq!(end_std(&one_end, -1.0), None);
 
-        let (undetermined, one_wall) = open(&walls[..1], ends);
+        let (undetermined, _) = open(&walls[..1], ends);
         assert_eq!(undetermined, [Freedom::X, Freedom::Y, Freedom::TiltX, Freedom::Size, Freedom::Second], "{ends:?}");
-        assert_eq!(one_wall.width(), None);
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{check_size, pose_along, radial, side};
-use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+use super::{Distance, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
@@ -28,11 +28,6 @@ impl Cone {
     /// From the centre of a circle, the axis (any length but 0), radius of the circle, half angle.
     pub fn new(center: Point3<f64>, axis: &Vector3<f64>, radius: f64, half_angle: f64, concave: bool) -> Self {
         Self { pose_of: pose_along(center, axis), radius, half_angle, concave }
-    }
-
-    /// Radius at a height above the circle along z, m.
-    pub(crate) fn radius_at(&self, height: f64) -> f64 {
-        self.radius + height * self.half_angle.tan()
     }
 
     /// Where all lines meet, m, in O; `None` for a cylinder.
@@ -94,20 +89,5 @@ impl Surface for Cone {
         check_size("radius", self.radius)?;
         let value = self.half_angle;
         if value.abs() < FRAC_PI_2 { Ok(()) } else { Err(FitError::BadSize { what: "half angle", value }) }
-    }
-}
-
-impl Fit<Cone> {
-    /// Diameter at a height above the reference circle along z, m: where it meets the plane around it.
-    pub fn diameter_at(&self, height: f64) -> Option<Estimate> {
-        let cone = &self.surface;
-        let cos = cone.half_angle.cos();
-        let by = [(Freedom::Size, 2.0 / cos), (Freedom::Second, 2.0 * height / (cos * cos))];
-        self.estimate(2.0 * cone.radius_at(height), &by)
-    }
-
-    /// Full angle between opposite lines, rad, ≥ 0.
-    pub fn full_angle(&self) -> Option<Estimate> {
-        self.estimate(2.0 * self.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])
     }
 }

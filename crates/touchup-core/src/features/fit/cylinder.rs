@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{check_size, pose_along, radial, side};
-use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+use super::{Distance, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A cylinder without ends.
@@ -68,11 +68,6 @@ impl Cylinder {
 }
 
 impl Fit<Cylinder> {
-    /// Twice the radius, m.
-    pub fn diameter(&self) -> Option<Estimate> {
-        self.estimate(2.0 * self.surface.radius, &[(Freedom::Size, 2.0)])
-    }
-
     /// Root mean square distance across the axis by which a place on it may be off, m.
     pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
         let height = self.surface.pose_of.inverse_transform_point(at).z;

@@ -9,44 +9,23 @@ use super::{Freedom, Steps, Surface};
 /// far below.
 const KNOWN: f64 = 1e-6;
 
-/// A number with its standard deviation, in the same unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// The number.
-    pub value: f64,
-    /// Its standard deviation.
-    pub std: f64,
-}
-
-/// Origin of the standard deviations of a fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SigmaFrom {
-    /// The stated ones: the residuals are not larger, or there are too few groups to ask them. In that case they are
-    /// only stretched by √(χ²/degrees) where that is above 1.
-    Stated,
-    /// The residuals, which are larger than the stated ones explain, at least in some direction.
-    Residuals,
-}
-
 /// A fitted surface.
 #[derive(Clone, Debug)]
 pub struct Fit<M> {
     /// The surface of least squares, without the bias of curvature.
     pub surface: M,
-    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined.
+    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined. By the residuals in the
+    /// directions in which they are larger than the stated deviations explain; where there are too few groups to ask them, by
+    /// the stated ones, stretched by √(χ²/degrees) where that is above 1.
     pub covariance: FreedomMatrix,
     /// For each observation whether it was kept.
     pub used: Vec<bool>,
-    /// Root mean square distance of what was kept, m.
-    pub rms: f64,
     /// Σ w r² of what was kept, where groups count once.
     pub chi_squared: f64,
     /// Groups less unknowns: what χ² should be about.
     pub degrees: usize,
     /// Groups of which something was kept.
     pub groups: usize,
-    /// Origin of the covariance.
-    pub sigma_from: SigmaFrom,
     /// projector onto what is not fixed, in units of `alone`
     pub(super) unknown: FreedomMatrix,
     /// the step of each freedom that changes the residuals by one standard deviation if taken alone
@@ -69,17 +48,11 @@ impl<M: Surface> Fit<M> {
         (has_all && is_fixed).then(|| by.dot(&(self.covariance * by)).max(0.0).sqrt())
     }
 
-    /// A number with its standard deviation, from its derivatives by the freedoms.
-    pub fn estimate(&self, value: f64, by: &[(Freedom, f64)]) -> Option<Estimate> {
+    /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is not fixed.
+    pub fn std_by(&self, by: &[(Freedom, f64)]) -> Option<f64> {
         let mut steps = Steps::zeros();
         by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x);
-        self.std_of(&steps).map(|std| Estimate { value, std })
-    }
-
-    /// The freedoms that the observations do not fix.
-    pub fn undetermined(&self) -> Vec<Freedom> {
-        let is_open = |f: &Freedom| M::FREE[*f as usize] && self.std(*f).is_none();
-        Freedom::ALL.into_iter().filter(is_open).collect()
+        self.std_of(&steps)
     }
 
     /// Angle by which the axis may be off, rad: root of the sum of both variances.

@@ -27,7 +27,7 @@ mod uncertainty;
 pub use cone::Cone;
 pub use cylinder::Cylinder;
 pub use error::FitError;
-pub use estimate::{Estimate, Fit, SigmaFrom};
+pub use estimate::Fit;
 pub use observation::{FitParams, Observation};
 pub use plane::Plane;
 pub use robust::fit;

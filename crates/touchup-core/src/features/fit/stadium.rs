@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use super::surface::{check_size, pose_along, side};
-use super::{Distance, Estimate, Fit, FitError, Freedom, Surface};
+use super::{Distance, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A touch determines an end when its normal has at least this share along the slot: 30° from the wall.
@@ -153,22 +153,5 @@ impl Fit<Stadium> {
     pub(crate) fn middle_std(&self) -> Option<f64> {
         let across = self.std(Freedom::Y)?;
         Some(self.std(Freedom::X).map_or(across, |along| across.hypot(along)))
-    }
-
-    /// From wall to wall, m; `None` where only one wall was touched.
-    pub fn width(&self) -> Option<Estimate> {
-        self.estimate(self.surface.width, &[(Freedom::Size, 1.0)])
-    }
-
-    /// From end to end, m; `None` unless both ends were touched.
-    pub fn length(&self) -> Option<Estimate> {
-        self.estimate(self.surface.length, &[(Freedom::Second, 1.0)])
-    }
-
-    /// How far the end in direction `sign` (1: along x of F, −1: against it) is from the origin of F, m; `None` where it
-    /// was not touched.
-    pub fn end(&self, sign: f64) -> Option<Estimate> {
-        let sign = 1f64.copysign(sign);
-        self.estimate(self.surface.length / 2.0, &[(Freedom::X, sign), (Freedom::Second, 0.5)])
     }
 }

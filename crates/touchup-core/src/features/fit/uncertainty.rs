@@ -3,7 +3,7 @@
 use nalgebra::SymmetricEigen;
 
 use super::solver::{FitProblem, FreedomMatrix};
-use super::{Fit, FitError, FitParams, Freedom, SigmaFrom, Steps, Surface};
+use super::{Fit, FitError, FitParams, Freedom, Steps, Surface};
 
 /// A direction is undetermined when the observations leave it uncertain by more than the size of what was touched, or by
 /// more than 1 rad (both are 1 in scaled steps) …
@@ -38,8 +38,8 @@ impl<M: Surface> Fit<M> {
         let chi_squared = equations.square;
         let degrees = (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
         let spread = (chi_squared / degrees.max(1) as f64).max(1.0);
-        let (inner, sigma_from) = if groups < fixed + SPARE_GROUPS {
-            (FreedomMatrix::identity() * spread, SigmaFrom::Stated)
+        let inner = if groups < fixed + SPARE_GROUPS {
+            FreedomMatrix::identity() * spread
         } else {
             let correction = groups as f64 / (groups - fixed) as f64;
             let prior = scaled.tr_mul(&(problem.prior(&surface).information * scaled));
@@ -51,10 +51,7 @@ impl<M: Surface> Fit<M> {
         let covariance = deviations * inner * deviations.transpose() + common * common.transpose();
         let alone = units.component_mul(&alone);
         let used: Vec<bool> = kept.iter().map(|k| *k > 0.0).collect();
-        let count = used.iter().filter(|used| **used).count();
-        let square = |i: usize| if used[i] { problem.residual(&surface, i).powi(2) } else { 0.0 };
-        let rms = ((0..used.len()).map(square).sum::<f64>() / count.max(1) as f64).sqrt();
-        Self { surface, covariance, used, rms, chi_squared, degrees, groups, sigma_from, unknown, alone, deviations }
+        Self { surface, covariance, used, chi_squared, degrees, groups, unknown, alone, deviations }
     }
 
     /// # Errors
@@ -87,10 +84,9 @@ fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Ste
     (fixed, unknown, alone)
 }
 
-/// The matrix with its eigenvalues raised to at least 1, and whether that left anything of it.
-fn at_least_one(matrix: FreedomMatrix) -> (FreedomMatrix, SigmaFrom) {
+/// The matrix with its eigenvalues raised to at least 1.
+fn at_least_one(matrix: FreedomMatrix) -> FreedomMatrix {
     let mut eigen = SymmetricEigen::new(matrix);
-    let from = if eigen.eigenvalues.max() > 1.0 { SigmaFrom::Residuals } else { SigmaFrom::Stated };
     eigen.eigenvalues.apply(|x| *x = x.max(1.0));
-    (eigen.recompose(), from)
+    eigen.recompose()
 }

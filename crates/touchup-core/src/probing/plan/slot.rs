@@ -330,7 +330,7 @@ impl Stage for SlotPattern {
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
         let fitted = fit(walls, &self.measuring.observations, &square())?;
         // where an end was not touched it has no length, and no middle
-        fitted.length().ok_or_else(|| self.not_done(context))?;
+        fitted.std(Freedom::Second).ok_or_else(|| self.not_done(context))?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::slot(&fitted, &top, self.floor.as_ref(), touches)))
     }
