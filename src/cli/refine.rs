@@ -307,7 +307,7 @@ impl RefineArguments {
                 rates.change_strokes(change.is_undo);
             }
         };
-        let mut clock = scene.clock_params().map(ClockEstimator::new).transpose()?;
+        let mut clock = scene.clock.as_ref().map(|_| ClockEstimator::new(scene.tip_params().stiffness)).transpose()?;
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         // an update that takes every sample for contact says nothing about contact
         let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Vector3};
 use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
 use touchup::stylus::{
-    ClockEstimator, ClockOffset, ClockParams, ContactEstimator, ContactEstimatorParams, Sample, SyncParams,
-    Synchroniser, TipParams, Wrench,
+    ClockEstimator, ClockOffset, ContactEstimator, ContactEstimatorParams, Sample, SyncParams, Synchroniser, TipParams,
+    Wrench,
 };
 
 fn contacts() -> ContactEstimator {
@@ -20,7 +20,7 @@ fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
     let touch = touch(&plate, &path, &stylus, seed).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     let mut contacts = contacts();
-    let mut clock = ClockEstimator::new(ClockParams { stiffness: Some(stylus.stiffness) }).unwrap();
+    let mut clock = ClockEstimator::new(Some(stylus.stiffness)).unwrap();
     for message in touch.messages {
         sync.push(message);
         while let Some(sample) = sync.next_sample() {
@@ -52,7 +52,7 @@ fn sample(ms: i64, height: f64, force: f64) -> Sample {
 }
 
 fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
-    let (mut clock, mut contacts) = (ClockEstimator::new(ClockParams::default()).unwrap(), contacts());
+    let (mut clock, mut contacts) = (ClockEstimator::new(None).unwrap(), contacts());
     samples.into_iter().for_each(|sample| clock.push(contacts.observe(&sample).unwrap()));
     clock.offset()
 }

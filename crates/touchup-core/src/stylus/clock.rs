@@ -13,13 +13,6 @@ use serde::Serialize;
 use super::{ContactSample, SettingError};
 use crate::numeric::NormalEquations;
 
-/// Settings of a [`ClockEstimator`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ClockParams {
-    /// Stiffness of stylus and probe, N/m; `None`: rigid.
-    pub stiffness: Option<f64>,
-}
-
 /// What the clock of the wrench reads beyond that of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
@@ -61,7 +54,7 @@ const LARGEST_SIGMA: f64 = 3e-3;
 /// Collects onsets of contact. Memory is bounded.
 #[derive(Clone, Debug)]
 pub struct ClockEstimator {
-    params: ClockParams,
+    stiffness: Option<f64>,
     is_in_contact: bool,
     held: VecDeque<OnsetEntry>,
     /// stamp at which contact began or ended last, and the onset that waits for its samples
@@ -83,14 +76,16 @@ struct OnsetEntry {
 type Profile = [f64; DELAYS];
 
 impl ClockEstimator {
+    /// - `stiffness`: of stylus and probe, N/m; `None`: rigid.
+    ///
     /// # Errors
     /// [`SettingError`] for a stiffness of no use.
-    pub fn new(params: ClockParams) -> Result<Self, SettingError> {
-        let stiffness = params.stiffness.unwrap_or(1.0);
-        SettingError::check("tip stiffness (N/m)", stiffness, stiffness > 0.0, "more than 0")?;
+    pub fn new(stiffness: Option<f64>) -> Result<Self, SettingError> {
+        let value = stiffness.unwrap_or(1.0);
+        SettingError::check("tip stiffness (N/m)", value, value > 0.0, "more than 0")?;
         let held = VecDeque::with_capacity(MOST_SAMPLES);
         let onsets = VecDeque::new();
-        Ok(Self { params, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets })
+        Ok(Self { stiffness, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets })
     }
 
     /// Takes the next sample, which is later than the one before.
@@ -170,7 +165,7 @@ impl ClockEstimator {
         let middle = samples[count / 2].centre;
         samples.iter_mut().for_each(|x| x.centre -= middle);
         let begun = force_begins(&samples)?;
-        let bend = 1.0 / self.params.stiffness.unwrap_or(f64::INFINITY);
+        let bend = 1.0 / self.stiffness.unwrap_or(f64::INFINITY);
         let mut profile = [0.0; DELAYS];
         let (mut stop, mut least) = (0.0, f64::INFINITY);
         for (at, out) in profile.iter_mut().enumerate() {

@@ -24,7 +24,7 @@ mod tip_motion;
 mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
-pub use clock::{ClockEstimator, ClockOffset, ClockParams};
+pub use clock::{ClockEstimator, ClockOffset};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub(crate) use contact::STROKE_PAUSE_NS;
 pub use contact::{Contact, ContactGate, ContactGateParams};

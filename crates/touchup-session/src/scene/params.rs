@@ -13,8 +13,8 @@ use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
 use touchup_core::probing::plan::{PatternParams, sigma_of};
 use touchup_core::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
 use touchup_core::stylus::{
-    ClockParams, CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams, TipBody,
-    TipShape, Wrench, WrenchFrame,
+    CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams, TipBody, TipShape,
+    Wrench, WrenchFrame,
 };
 use touchup_sim::ArmParams;
 
@@ -49,11 +49,6 @@ impl Scene {
         let sigma = sigma_of(robot.tolerance, robot.confidence);
         let pattern = PatternParams { ball_radius, sigma, ..*pattern };
         Some((cell, ProbeParams { touch, pattern, slides: false, limits: limits.clone() }))
-    }
-
-    /// Settings of the estimate of the clock, if there is one.
-    pub fn clock_params(&self) -> Option<ClockParams> {
-        self.clock.as_ref().map(|_| ClockParams { stiffness: self.tip_params().stiffness })
     }
 
     /// The filter that makes poses of markers, if there is one.
