@@ -95,24 +95,8 @@ impl Fan {
     fn gather(&mut self, mesh: &TriMesh, vertex: VertexId) {
         self.links.clear();
         self.links.extend(mesh.star(vertex).iter().map(|&face| {
-            let [VertexId(a), VertexId(b), VertexId(c)] = mesh.corners(face);
-            // written so that no branch has to be guessed
-            let (at_a, at_b) = (vertex.0 == a, vertex.0 == b);
-            let next = if at_a {
-                b
-            } else if at_b {
-                c
-            } else {
-                a
-            };
-            let last = if at_a {
-                c
-            } else if at_b {
-                a
-            } else {
-                b
-            };
-            [next, last]
+            let [next, last] = mesh.other_corners(face, vertex);
+            [next.0, last.0]
         }));
     }
 

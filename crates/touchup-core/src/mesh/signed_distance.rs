@@ -35,9 +35,7 @@ pub fn pseudo_normal(mesh: &TriMesh, hit: &FaceHit) -> Vector3<f64> {
 pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     let apex = mesh.position(vertex);
     let weighted = mesh.star(vertex).iter().map(|&face| {
-        let corners = mesh.corners(face);
-        let at = corners.iter().position(|&v| v == vertex).unwrap_or(2);
-        let [u, v] = [1, 2].map(|i| mesh.position(corners[(at + i) % 3]) - apex);
+        let [u, v] = mesh.other_corners(face, vertex).map(|corner| mesh.position(corner) - apex);
         mesh.normal(face) * u.angle(&v)
     });
     weighted.sum()

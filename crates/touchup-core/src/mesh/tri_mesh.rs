@@ -165,6 +165,29 @@ impl TriMesh {
         self.faces[face.0 as usize].map(VertexId)
     }
 
+    /// The two corners of a face that follow one of it, in the order of [`Self::corners`].
+    #[inline]
+    pub(crate) fn other_corners(&self, face: FaceId, vertex: VertexId) -> [VertexId; 2] {
+        let [a, b, c] = self.corners(face);
+        // each chosen alone, so that no branch has to be guessed
+        let (at_a, at_b) = (vertex == a, vertex == b);
+        let next = if at_a {
+            b
+        } else if at_b {
+            c
+        } else {
+            a
+        };
+        let last = if at_a {
+            c
+        } else if at_b {
+            a
+        } else {
+            b
+        };
+        [next, last]
+    }
+
     /// Position of a vertex, m, in O.
     #[inline]
     pub fn position(&self, vertex: VertexId) -> Point3<f64> {

@@ -165,14 +165,7 @@ fn sides_above<'a>(mesh: &TriMesh, vertex: u32, room: &'a mut [Vec<EdgeSide>; 2]
     });
     let (mut ahead, mut behind) = (0, 0);
     for &face in star {
-        let [a, b, c] = mesh.corners(face).map(|v| v.0);
-        let (next, previous) = if a == vertex {
-            (b, c)
-        } else if b == vertex {
-            (c, a)
-        } else {
-            (a, b)
-        };
+        let [VertexId(next), VertexId(previous)] = mesh.other_corners(face, VertexId(vertex));
         // written first and counted afterwards: which ones go up is past any guess, so no branch hangs on it
         forward[ahead] = EdgeSide::new(next, face);
         ahead += usize::from(next > vertex);
