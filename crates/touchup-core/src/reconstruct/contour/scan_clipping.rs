@@ -3,6 +3,7 @@
 use nalgebra::{Point2, Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
+use crate::numeric::distinct;
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
 use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::triangulation::fill;
@@ -218,9 +219,7 @@ pub(in crate::reconstruct) fn faces_near(
         tree.faces_in_box(&lattice.position(lo), &lattice.position(hi), &mut query);
         faces.extend_from_slice(&query.faces);
     }
-    faces.sort_unstable();
-    faces.dedup();
-    faces
+    distinct(faces)
 }
 
 /// A side of a piece at which the part that stays ends.

@@ -5,6 +5,8 @@ use nalgebra::Point2;
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{ConstrainedDelaunayTriangulation, Triangulation};
 
+use crate::numeric::flood;
+
 /// Indices of three corners, counter-clockwise.
 pub(in crate::reconstruct) type Triangle = [u32; 3];
 
@@ -52,26 +54,17 @@ fn faces_inside(
     sides: impl Iterator<Item = [FixedVertexHandle; 2]>,
 ) -> Vec<FixedFaceHandle<InnerTag>> {
     let mut is_inside = vec![false; delaunay.num_all_faces()];
-    let mut inside: Vec<FixedFaceHandle<InnerTag>> = Vec::new();
-    let mut take = |face: Option<FixedFaceHandle<InnerTag>>, inside: &mut Vec<_>| {
-        if let Some(face) = face
-            && !std::mem::replace(&mut is_inside[face.index()], true)
-        {
-            inside.push(face);
-        }
+    let mut takes = |face: FixedFaceHandle<InnerTag>| !std::mem::replace(&mut is_inside[face.index()], true);
+    let beside = |side: [FixedVertexHandle; 2]| {
+        let side = delaunay.get_edge_from_neighbors(side[0], side[1])?;
+        Some(side.face().as_inner()?.fix())
     };
-    for [from, to] in sides {
-        let side = delaunay.get_edge_from_neighbors(from, to);
-        take(side.and_then(|side| side.face().as_inner()).map(|face| face.fix()), &mut inside);
-    }
-    let mut next = 0;
-    while let Some(&face) = inside.get(next) {
-        for edge in delaunay.face(face).adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge()) {
-            take(edge.rev().face().as_inner().map(|face| face.fix()), &mut inside);
-        }
-        next += 1;
-    }
-    inside
+    let first = sides.filter_map(beside).filter(|&face| takes(face)).collect();
+    let neighbours = |face: FixedFaceHandle<InnerTag>| {
+        let open = delaunay.face(face).adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge());
+        open.filter_map(|edge| Some(edge.rev().face().as_inner()?.fix()))
+    };
+    flood(first, neighbours, takes)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
 //! scan's own distance pulls weakly, so that a pocket that was touched down to some depth gets a bottom.
 
+use crate::numeric::flood;
 use crate::reconstruct::evidence::point_evidence::{NodeState, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
 use crate::reconstruct::field::lattice::{self, LatticeNode, Numbers, cell_at, node_at};
@@ -210,17 +211,14 @@ pub(in crate::reconstruct) fn end_reach(grid: &ReconstructionGrid, radius: f64) 
 pub(in crate::reconstruct) fn open_cells(grid: &ReconstructionGrid, reach: i32) -> CellTable<LatticeNode, ()> {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
     let ends = grid.ends.iter().map(|(end, ())| end).filter(|end| grid.nodes.get(end).is_some_and(is_end));
-    let mut cells: Vec<(LatticeNode, LatticeNode)> =
-        ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end))).collect();
     let mut open = CellTable::default();
-    let mut next = 0;
-    while let Some(&(cell, end)) = cells.get(next) {
-        next += 1;
+    let mut takes = |(cell, end): (LatticeNode, LatticeNode)| {
         let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
-        if is_near && is_unsupported_surface(grid, cell) && open.insert_with(cell, || ()).1 {
-            cells.extend(lattice::neighbours(cell).map(|cell| (cell, end)));
-        }
-    }
+        is_near && is_unsupported_surface(grid, cell) && open.insert_with(cell, || ()).1
+    };
+    let cells = ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end)));
+    let first = cells.filter(|&cell| takes(cell)).collect();
+    flood(first, |(cell, end)| lattice::neighbours(cell).map(|cell| (cell, end)), takes);
     open
 }
 
