@@ -1,10 +1,11 @@
 //! Where the hand leads the ball: rasters, runs along walls, free moves between them.
 
-use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 
 use super::error::{SimError, not_negative, positive, up_to};
 use super::plate::{Plate, PlateStadium};
 use super::surface::{Bounds, Surface};
+use touchup_core::numeric::turned_to;
 
 /// One pull of the hand.
 #[derive(Clone, Debug, PartialEq)]
@@ -267,10 +268,4 @@ fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Point2<f64>, 
 /// A frame in the middle of a box whose z axis points against the direction of view; any turn about it does.
 pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
     Isometry3::from_parts(bounds.centre().coords.into(), turned_to(&-view.into_inner()))
-}
-
-/// The smallest turn that takes z to a direction; half a turn about x to the opposite one.
-pub(super) fn turned_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::rotation_between(&Vector3::z(), direction)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }

@@ -11,11 +11,12 @@ use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
 use super::error::{SimError, not_negative, positive, up_to};
-use super::path::{Stroke, turned_to};
+use super::path::Stroke;
 use super::random::Drift;
 use super::sensor::{Sensor, SensorParams};
 use super::surface::Surface;
 use super::tip::SimTip;
+use touchup_core::numeric::turned_to;
 use touchup_core::stylus::{Message, TipShape};
 
 /// The stylus and the hand that leads it.

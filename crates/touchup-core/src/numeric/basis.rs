@@ -1,6 +1,6 @@
 //! Orthonormal bases from one direction.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// An axis is far enough from x where its share along x is below this: the cross product is then at least 0.8 long.
 const FAR_FROM_X: f64 = 0.6;
@@ -11,6 +11,12 @@ pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let aside = if axis.x.abs() < FAR_FROM_X { Vector3::x() } else { Vector3::y() };
     let u = axis.cross(&aside).normalize();
     [u, axis.cross(&u)]
+}
+
+/// The smallest turn that takes z to a direction; half a turn about x to the opposite one.
+pub fn turned_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ mod twist;
 mod voxel;
 
 pub(crate) use basis::tangent_basis;
+pub use basis::turned_to;
 pub use counted::counted;
 pub(crate) use least_squares::{DampedSearch, NormalEquations, SearchEnd};
 pub(crate) use moments::{centroid_and_spread, mean, scatter, spreads};

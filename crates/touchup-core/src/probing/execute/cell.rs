@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::links::Tool;
 use crate::mesh::TriMesh;
+use crate::numeric::turned_to;
 use crate::probing::arm::{Joints, LimitError, Limits, UrGeometry};
 
 /// A robot cell.
@@ -56,10 +57,7 @@ impl Cell {
     pub fn above(&self, part: &TriMesh) -> Isometry3<f64> {
         let [low, high] = part.bounds();
         let middle = Point3::new(f64::midpoint(low.x, high.x), f64::midpoint(low.y, high.y), high.z + ABOVE);
-        let up = self.pose_bo.rotation * Vector3::z();
-        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &up)
-            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-        self.pose(&turn, &middle)
+        self.pose(&turned_to(&(self.pose_bo.rotation * Vector3::z())), &middle)
     }
 
     /// Whether the limits allow the tip there.

@@ -1,6 +1,6 @@
 //! A flagged feature, explored touch by touch.
 
-use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::error::ExploreError;
 use super::pattern::{Stage, Touched};
@@ -9,6 +9,7 @@ use super::slide::Slide;
 use super::{boss, edge, hole, plane, region, slot};
 use crate::features::fit::Observation;
 use crate::features::{Feature, Kind};
+use crate::numeric::turned_to;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,9 +61,7 @@ impl Explorer {
             Some(Kind::Corner) => return Err(ExploreError::NoPattern { kind: Kind::Corner.name() }),
             None => Box::new(region::RegionPattern::new(&params)),
         };
-        let turn = UnitQuaternion::rotation_between(&Vector3::z(), normal)
-            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-        let pose_of = Isometry3::from_parts(flag.coords.into(), turn);
+        let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
         Ok(Self {
             context: SearchContext { params, pose_of, height: 0.0, touches: 0 },
             stage,
