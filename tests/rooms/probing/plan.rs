@@ -30,6 +30,30 @@ fn wall() -> Vec<Candidate> {
     places.map(|(angle, depth)| Candidate { point: at(angle, depth), sigma: SIGMA }).collect()
 }
 
+/// Up to `count` touches, each as if those before had been made, until all is known as it is asked for.
+fn plan<M: Surface>(
+    mut known: Knowledge,
+    surface: &M,
+    candidates: &[Candidate],
+    asked: &Asked,
+    count: usize,
+) -> (Vec<usize>, Knowledge) {
+    let mut chosen = Vec::new();
+    while chosen.len() < count
+        && known.worst(asked) > 1.0
+        && let Some(best) = known.best(surface, candidates, asked)
+    {
+        known = known.with(surface, &candidates[best]);
+        chosen.push(best);
+    }
+    (chosen, known)
+}
+
+/// Standard deviation of a number that changes with a freedom.
+fn sigma_of(known: &Knowledge, by: (Freedom, f64)) -> f64 {
+    known.worst(&Asked::default().and(&[by], 1.0))
+}
+
 fn observation(candidate: &Candidate, group: u32) -> Observation {
     Observation { point: candidate.point, offset: 0.0, sigma: candidate.sigma, group }
 }
@@ -44,28 +68,9 @@ fn predicted_and_fitted_covariance_agree() {
     let observations: Vec<_> = chosen.iter().zip(0..).map(|(touch, group)| observation(touch, group)).collect();
     let fitted = fit(&surface, &observations, &FitParams::default()).unwrap();
     for freedom in [Freedom::Size, Freedom::TiltX, Freedom::TiltY] {
-        let (ours, theirs) = (known.sigma_of(&[(freedom, 1.0)]), fitted.std(freedom).unwrap());
+        let (ours, theirs) = (sigma_of(&known, (freedom, 1.0)), fitted.std(freedom).unwrap());
         assert!((ours / theirs - 1.0).abs() < 1e-3, "{freedom:?}: {ours} {theirs}");
     }
-}
-
-/// A circle in a known plane: three touches a third of a turn apart determine its centre best, whatever the first was.
-#[test]
-fn three_touches_of_a_round_wall_are_a_third_of_a_turn_apart() {
-    let surface = hole();
-    let ring: Vec<_> = wall().into_iter().filter(|touch| (touch.point.z - 6e-3).abs() < 1e-9).collect();
-    let asked = Asked::default()
-        .and(&[(Freedom::X, 1.0)], 1e-9)
-        .and(&[(Freedom::Y, 1.0)], 1e-9)
-        .and(&[(Freedom::Size, 1.0)], 1e-9);
-    let (chosen, _) = Knowledge::before::<Cylinder>(3e-3, 1e-9).plan(&surface, &ring, &asked, 3);
-    let angle = |index: usize| (ring[index].point.y - 36e-3).atan2(ring[index].point.x - 16e-3);
-    let mut gaps: Vec<f64> = vec![
-        (angle(chosen[1]) - angle(chosen[0])).rem_euclid(TAU),
-        (angle(chosen[2]) - angle(chosen[0])).rem_euclid(TAU),
-    ];
-    gaps.sort_by(f64::total_cmp);
-    assert!((gaps[0] - TAU / 3.0).abs() < TAU / 11.0 && (gaps[1] - 2.0 * TAU / 3.0).abs() < TAU / 11.0, "{gaps:?}");
 }
 
 /// The tilt of a plane is determined by its corners, its height by any place.
@@ -79,7 +84,8 @@ fn the_tilt_of_a_plane_is_asked_at_its_corners() {
         })
         .collect();
     let asked = Asked::default().and(&[(Freedom::TiltX, 1.0)], 1e-9).and(&[(Freedom::TiltY, 1.0)], 1e-9);
-    let (chosen, _) = Knowledge::before::<Plane>(5e-3, 0.1).plan(&surface, &grid, &asked, 4);
+    let (chosen, _) = plan(Knowledge::before::<Plane>(5e-3, 0.1), &surface, &grid, &asked, 2);
+    assert_eq!(chosen.len(), 2);
     for index in chosen {
         let p = grid[index].point;
         assert!(p.x.abs() > 3.9e-3 && p.y.abs() > 3.9e-3, "{p}");
@@ -97,9 +103,9 @@ fn touches_are_as_many_as_the_goal_asks_for() {
         let first: Vec<usize> = (0..120).step_by(17).collect();
         let known =
             first.iter().fold(Knowledge::before::<Cylinder>(3e-3, 0.05), |known, &at| known.with(&surface, &wall[at]));
-        let (mut chosen, known) = known.plan(&surface, &wall, &asked, 400);
+        let (mut chosen, known) = plan(known, &surface, &wall, &asked, 400);
         chosen.extend(first);
-        let promised = known.sigma_of(&[(Freedom::Size, 2.0)]);
+        let promised = sigma_of(&known, (Freedom::Size, 2.0));
         assert!(promised <= wanted && chosen.len() < 400, "{} touches for {wanted}", chosen.len());
         let mut rng = Pcg64::seed_from_u64(7);
         let errors: Vec<f64> = (0..200)
@@ -207,7 +213,8 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
             .asked
             .iter()
             .fold(Asked::default(), |asked, (freedom, by, sigma)| asked.and(&[(*freedom, *by)], *sigma));
-        let (chosen, _) = known.plan(&guess, &places, &asked.and_the_rest::<M>(1e-6, 3e-3), count - first.len());
+        let asked = asked.and_the_rest::<M>(1e-6, 3e-3);
+        let (chosen, _) = plan(known, &guess, &places, &asked, count - first.len());
         let planned: Vec<_> = first.iter().copied().chain(chosen.iter().map(|at| places[*at])).collect();
         assert_eq!(planned.len(), count);
         let landed =

@@ -91,23 +91,10 @@ impl Knowledge {
         Self { covariance: (covariance + covariance.transpose()) / 2.0 }
     }
 
-    /// Standard deviation of a number that changes with the freedoms as `by` says, m or rad.
-    pub fn sigma_of(&self, by: &[(Freedom, f64)]) -> f64 {
-        let mut steps = Steps::zeros();
-        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x);
-        steps.dot(&(self.covariance * steps)).max(0.0).sqrt()
-    }
-
     /// Standard deviation of the surface along its normal at a place of it, m.
     pub(crate) fn sigma_at<M: Surface>(&self, surface: &M, point: &Point3<f64>) -> f64 {
         let (_, g) = surface.derivatives(point);
         g.dot(&(self.covariance * g)).max(0.0).sqrt()
-    }
-
-    /// Sum over the requested numbers of (deviation / requested deviation)²; below their count when all are known well enough
-    /// on average.
-    pub fn open(&self, asked: &Asked) -> f64 {
-        asked.by.iter().chain(&asked.rest).map(|c| c.dot(&(self.covariance * c))).sum()
     }
 
     /// The largest of the deviations over the requested ones; at most 1 when all are met.
@@ -116,7 +103,7 @@ impl Knowledge {
         shares.fold(0.0, f64::max)
     }
 
-    /// How much a touch would take from [`Self::open`].
+    /// How much a touch would take from the sum over the requested numbers of (deviation / requested deviation)².
     pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
@@ -130,44 +117,4 @@ impl Knowledge {
         let some = gains.filter(|(_, gain)| *gain > 0.0);
         some.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(index, _)| index)
     }
-
-    /// Up to `count` touches with the largest gain together; fewer when all has the requested uncertainty.
-    ///
-    /// Each is chosen as if those before had been made; then each is exchanged for a better one as long as there is one
-    /// \[Fedorov 1972\]. The derivatives are those of `surface`: it should be known to a small share of its size.
-    pub fn plan<M: Surface>(
-        &self,
-        surface: &M,
-        candidates: &[Candidate],
-        asked: &Asked,
-        count: usize,
-    ) -> (Vec<usize>, Self) {
-        let (mut chosen, mut known) = (Vec::new(), self.clone());
-        while chosen.len() < count && known.worst(asked) > 1.0 {
-            let Some(best) = known.best(surface, candidates, asked) else { break };
-            known = known.with(surface, &candidates[best]);
-            chosen.push(best);
-        }
-        let all =
-            |chosen: &[usize]| chosen.iter().fold(self.clone(), |known, &at| known.with(surface, &candidates[at]));
-        for _ in 0..EXCHANGES {
-            let before = known.open(asked);
-            for place in 0..chosen.len() {
-                let others: Vec<usize> = (0..chosen.len()).filter(|&at| at != place).map(|at| chosen[at]).collect();
-                if let Some(best) = all(&others).best(surface, candidates, asked) {
-                    chosen[place] = best;
-                }
-            }
-            known = all(&chosen);
-            if known.open(asked) >= before * (1.0 - SETTLED) {
-                break;
-            }
-        }
-        (chosen, known)
-    }
 }
-
-/// Rounds of exchanges; three are usual.
-const EXCHANGES: usize = 20;
-/// Exchanges go on while they take more than this share of what is open.
-const SETTLED: f64 = 1e-6;
