@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::file_error::{FileError, read_file, write_file};
 use touchup_core::features::clusters::{Bend, Cluster};
-use touchup_core::features::{Feature, FittedTo, Measured};
+use touchup_core::features::{Feature, Measured};
 
 /// Why a file of features could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -158,11 +158,7 @@ impl From<&Feature> for FeatureRecord {
             convex: feature.is_convex,
             std,
             touched: feature.touched,
-            fitted_to: match feature.fitted_to {
-                FittedTo::Touches => "touches",
-                FittedTo::Mesh => "mesh",
-            }
-            .to_owned(),
+            fitted_to: feature.fitted_to.name().to_owned(),
             touches,
         }
     }

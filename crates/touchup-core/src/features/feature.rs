@@ -26,13 +26,15 @@ names! {
     }
 }
 
-/// What the numbers of a feature were fitted to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FittedTo {
-    /// touches
-    Touches,
-    /// the mesh: too little of it was touched
-    Mesh,
+names! {
+    /// What the numbers of a feature were fitted to.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum FittedTo {
+        /// touches
+        Touches = "touches",
+        /// the mesh: too little of it was touched
+        Mesh = "mesh",
+    }
 }
 
 /// A number, how well it is known, and the touches that it comes from.
