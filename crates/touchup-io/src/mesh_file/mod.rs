@@ -1,8 +1,10 @@
 //! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out.
 
+mod column;
 mod defect;
 mod obj;
 mod ply;
+mod soup;
 mod stl;
 mod text;
 mod unit;
@@ -14,8 +16,10 @@ use nalgebra::Point3;
 use super::atomic::AtomicFile;
 pub use super::file_error::FilePlace;
 use super::file_error::{FileError, read_file, write_file};
+pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
+use soup::Soup;
 use touchup_core::mesh::{MeshError, RepairReport, TriMesh, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
@@ -74,24 +78,6 @@ pub struct MeshFile {
     pub mesh: TriMesh,
     /// defects of the file
     pub repair: RepairReport,
-}
-
-/// Triangles as read from a file.
-#[derive(Debug, Default)]
-struct Soup {
-    positions: Vec<Point3<f64>>,
-    faces: Vec<[u32; 3]>,
-    /// vertices in the file that did not even get into `positions`
-    unused: usize,
-}
-
-impl Soup {
-    /// Three positions for each triangle.
-    fn of_triangles(positions: Vec<Point3<f64>>) -> Self {
-        // beyond 32 bits `repair` refuses by the number of positions
-        let faces = (0..positions.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-        Self { positions, faces, unused: 0 }
-    }
 }
 
 #[derive(Clone, Copy)]
@@ -207,36 +193,6 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), Mes
     write_mesh_with(path, mesh, &[], unit)
 }
 
-/// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
-#[derive(Clone, Debug)]
-pub struct VertexColumn {
-    /// name of the property, with its unit
-    pub name: &'static str,
-    /// as many as the mesh has vertices
-    pub values: ColumnValues,
-}
-
-/// The numbers of a [`VertexColumn`], with their type in the file.
-#[derive(Clone, Debug)]
-pub enum ColumnValues {
-    /// `float`
-    Single(Vec<f32>),
-    /// `uchar`, as colours are
-    Byte(Vec<u8>),
-}
-
-impl From<Vec<f32>> for ColumnValues {
-    fn from(values: Vec<f32>) -> Self {
-        Self::Single(values)
-    }
-}
-
-impl From<Vec<u8>> for ColumnValues {
-    fn from(values: Vec<u8>) -> Self {
-        Self::Byte(values)
-    }
-}
-
 /// [`write_mesh`] with `columns`, which STL and OBJ have no place for.
 ///
 /// # Errors
@@ -248,21 +204,10 @@ pub fn write_mesh_with(
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
     let format = Format::of_name(path)?;
-    let ((soup, ids), unit) = (used_part(mesh, unit.metres()), unit.to_string());
+    let ((soup, ids), unit) = (Soup::used_part(mesh, unit.metres()), unit.to_string());
     Ok(write_file(path, |out| match format {
         Format::Ply => ply::write(&soup, &ids, columns, &unit, out),
         Format::Stl => stl::write(&soup, &unit, out),
         Format::Obj => obj::write(&soup, &unit, out),
     })?)
-}
-
-/// Faces that are there and the vertices they use, coordinates divided by `scale`; and the ids of these vertices.
-fn used_part(mesh: &TriMesh, scale: f64) -> (Soup, Vec<usize>) {
-    let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
-    mesh.faces().flat_map(|(_, corners)| corners).for_each(|v| renamed[v.0 as usize] = 0);
-    let ids: Vec<usize> = (0..renamed.len()).filter(|&id| renamed[id] == 0).collect();
-    ids.iter().zip(0..).for_each(|(&id, name)| renamed[id] = name);
-    let positions = ids.iter().map(|&id| mesh.positions()[id] / scale).collect();
-    let faces = mesh.faces().map(|(_, corners)| corners.map(|v| renamed[v.0 as usize])).collect();
-    (Soup { positions, faces, unused: 0 }, ids)
 }

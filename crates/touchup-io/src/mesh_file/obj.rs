@@ -6,8 +6,8 @@ use std::io::{self, BufRead, Read, Write};
 use nalgebra::Point3;
 use tobj::{LoadError, LoadOptions};
 
-use super::Soup;
 use super::defect::{Defect, Syntax};
+use super::soup::Soup;
 use super::text::NumberedLines;
 use crate::file_error::FilePlace;
 

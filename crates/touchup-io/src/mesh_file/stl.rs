@@ -4,8 +4,8 @@ use std::io::{self, Write};
 
 use nalgebra::Point3;
 
-use super::Soup;
 use super::defect::{Defect, Syntax};
+use super::soup::Soup;
 use super::text::{NumberedLines, number};
 use crate::file_error::FilePlace;
 

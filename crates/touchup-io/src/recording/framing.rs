@@ -5,7 +5,6 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use super::Damage;
-use super::mcap::op;
 
 /// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a machine's memory.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
@@ -15,6 +14,17 @@ const MAX_TEXT_BYTES: u64 = 64 << 10;
 pub(super) const HEAD_BYTES: usize = 9;
 /// Piece in which unused records are skipped.
 const SKIP_BYTES: u64 = 1 << 20;
+
+/// Opcodes of the records that are read.
+pub(super) mod op {
+    pub const FOOTER: u8 = 0x02;
+    pub const SCHEMA: u8 = 0x03;
+    pub const CHANNEL: u8 = 0x04;
+    pub const MESSAGE: u8 = 0x05;
+    pub const CHUNK: u8 = 0x06;
+    pub const STATISTICS: u8 = 0x0b;
+    pub const DATA_END: u8 = 0x0f;
+}
 
 /// A stored checksum of 0 means that none was computed.
 pub(super) fn check_crc(what: &'static str, stored: u32, computed: u32) -> Result<(), Damage> {

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::error::check_topic;
-use super::framing::{ByteStream, Fields, HEAD_BYTES, check_crc, check_length, split_record};
+use super::framing::{ByteStream, Fields, HEAD_BYTES, check_crc, check_length, op, split_record};
 use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -21,17 +21,6 @@ pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
 /// Channel, sequence, log time and publish time in front of a message's payload.
 const MESSAGE_HEAD_BYTES: usize = 22;
-
-/// Opcodes of the records that are read.
-pub(super) mod op {
-    pub const FOOTER: u8 = 0x02;
-    pub const SCHEMA: u8 = 0x03;
-    pub const CHANNEL: u8 = 0x04;
-    pub const MESSAGE: u8 = 0x05;
-    pub const CHUNK: u8 = 0x06;
-    pub const STATISTICS: u8 = 0x0b;
-    pub const DATA_END: u8 = 0x0f;
-}
 
 /// Messages of the two topics of one MCAP file, in the order of the file.
 pub(super) struct McapReader {

@@ -7,8 +7,9 @@ use std::io::{self, Write};
 
 use nalgebra::Point3;
 
+use super::column::{ColumnValues, VertexColumn};
 use super::defect::Syntax;
-use super::{ColumnValues, Soup, VertexColumn};
+use super::soup::Soup;
 use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
