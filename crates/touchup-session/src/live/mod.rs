@@ -7,6 +7,7 @@
 //! [`Pace::is_patient`]
 //! [`Engine::push`] waits instead, and the mesh at each sample is the same on every machine.
 
+mod error;
 mod gate;
 mod latency;
 mod probed;
@@ -16,67 +17,17 @@ mod worker;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
+pub use error::LiveError;
 pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
-use touchup_core::haptic::{RefineError, RefineParams, Refiner, Update};
+pub use renewals::{LiveCounts, Pace};
+use touchup_core::haptic::{RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
-use touchup_core::stylus::{BiasParams, Sample, SettingError};
+use touchup_core::stylus::{BiasParams, Sample};
 use worker::Question;
-
-/// Why a sample was not taken.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LiveError {
-    /// The haptic update refused it.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-    /// A setting outside its range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The system gives no thread.
-    #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
-    NoThread(String),
-    /// The thread of the patch ended.
-    #[error("the thread of the patch ended by a fault of touchup: please report it with the recording")]
-    Stopped,
-}
-
-/// When the patch is renewed, in time of the samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pace {
-    /// time from one renewal to the next, ns
-    pub every_ns: i64,
-    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for it
-    pub after_ns: i64,
-    /// whether samples wait for a change that is late
-    pub is_patient: bool,
-}
-
-impl Default for Pace {
-    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms. No sample waits.
-    fn default() -> Self {
-        Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
-    }
-}
-
-impl Pace {
-    fn check(&self) -> Result<(), SettingError> {
-        let (every, after) = (self.every_ns as f64, self.after_ns as f64);
-        SettingError::check("time between renewals of the patch (ns)", every, every > 0.0, "more than 0")?;
-        SettingError::check("time for a renewal of the patch (ns)", after, after >= 0.0, "0 or more")
-    }
-}
-
-/// Lag of the patch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LiveCounts {
-    /// renewals taken up
-    pub renewals: u64,
-    /// those that were not done when they were due
-    pub late: u64,
-}
 
 /// When the patch of an [`Engine`] is made.
 #[derive(Clone, Debug)]

@@ -4,12 +4,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
+use super::error::LiveError;
+use super::gate::Gate;
+use super::probed::TouchDelta;
 use super::worker::{Question, Worker, WorkerAnswer};
-use super::{Gate, LiveCounts, LiveError, Pace, TouchDelta};
 use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::{PatchDelta, Patcher};
-use touchup_core::stylus::ContactSample;
+use touchup_core::stylus::{ContactSample, SettingError};
 
 /// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
 const AT_ONCE: usize = 40;
@@ -17,6 +19,41 @@ const AT_ONCE: usize = 40;
 /// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
 /// it to go on with.
 const MOST_OPEN: usize = 2;
+
+/// When the patch is renewed, in time of the samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// time from one renewal to the next, ns
+    pub every_ns: i64,
+    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for it
+    pub after_ns: i64,
+    /// whether samples wait for a change that is late
+    pub is_patient: bool,
+}
+
+impl Default for Pace {
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms. No sample waits.
+    fn default() -> Self {
+        Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
+    }
+}
+
+impl Pace {
+    fn check(&self) -> Result<(), SettingError> {
+        let (every, after) = (self.every_ns as f64, self.after_ns as f64);
+        SettingError::check("time between renewals of the patch (ns)", every, every > 0.0, "more than 0")?;
+        SettingError::check("time for a renewal of the patch (ns)", after, after >= 0.0, "0 or more")
+    }
+}
+
+/// Lag of the patch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LiveCounts {
+    /// renewals taken up
+    pub renewals: u64,
+    /// those that were not done when they were due
+    pub late: u64,
+}
 
 /// The thread of the patch, and the channels to it and from it.
 #[derive(Debug)]

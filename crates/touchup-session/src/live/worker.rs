@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel};
 use std::thread::{Builder, JoinHandle};
 
-use super::LiveError;
+use super::error::LiveError;
 use super::gate::Gate;
 use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;

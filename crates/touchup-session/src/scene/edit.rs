@@ -30,9 +30,6 @@ impl Setting {
     }
 }
 
-/// What a remark of this program begins with; one that is there already is replaced.
-const MARK: &str = "# touchup calibrate";
-
 impl Scene {
     /// The text of a scene with `settings` in it.
     ///
@@ -46,7 +43,7 @@ impl Scene {
         let refused = |why: String| SceneError::CannotEdit { why, settings: listed(settings) };
         let mut text = yaml.to_owned();
         for (i, Setting { path, value }) in settings.iter().enumerate() {
-            let remark = if i == 0 { format!("  {MARK} {remark}") } else { String::new() };
+            let remark = if i == 0 { format!("  {} {remark}", block::MARK) } else { String::new() };
             let new = match flow::start(&text) {
                 Some(begin) => flow::set(&text, begin, path, value),
                 None => block::set(&text, path, value, &remark),

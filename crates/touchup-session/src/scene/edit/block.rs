@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use super::{MARK, flow};
+use super::flow;
+
+/// What a remark of this program begins with; one that is there already is replaced.
+pub(super) const MARK: &str = "# touchup calibrate";
 
 /// Spaces that a new level is set in by.
 const STEP: usize = 2;

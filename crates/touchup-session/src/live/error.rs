@@ -1,0 +1,21 @@
+//! Errors of the engine.
+
+use touchup_core::haptic::RefineError;
+use touchup_core::stylus::SettingError;
+
+/// Why a sample was not taken.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LiveError {
+    /// The haptic update refused it.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A setting outside its range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The system gives no thread.
+    #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
+    NoThread(String),
+    /// The thread of the patch ended.
+    #[error("the thread of the patch ended by a fault of touchup: please report it with the recording")]
+    Stopped,
+}
