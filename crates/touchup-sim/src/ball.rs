@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::surface::{Surface, SurfacePoint};
-use super::tip::TipBall;
 
 /// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step, so ten are usual.
 const ROUNDS: usize = 40;
@@ -27,6 +26,15 @@ pub struct BallContact {
     pub normal: Vector3<f64>,
     /// Distance along `normal` by which the ball is held back from the guide, m.
     pub held_back: f64,
+}
+
+/// One ball of a tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TipBall {
+    /// middle from the origin of T, m, in T or O
+    pub offset: Vector3<f64>,
+    /// m
+    pub radius: f64,
 }
 
 /// The plane that keeps the ball outside one piece of the surface: normal · centre ≥ level.

@@ -34,6 +34,6 @@ pub use path::{Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, 
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, PlateStadium, TruthFeature, TruthShape};
 pub use scanner::{ScanQuality, ScannerParams, measure_quality, scan};
-pub use sensor::SensorParams;
-pub use stylus::{Moment, StylusParams, Touch, touch};
+pub use sensor::{Moment, SensorParams};
+pub use stylus::{StylusParams, Touch, touch};
 pub use surface::{Bounds, Surface, SurfacePoint};

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::error::{SimError, positive, up_to};
 use super::random::{gauss_vector, uniform};
-use super::stylus::{Moment, TICK};
+use super::sensor::{Moment, TICK};
 use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
 /// The camera and how badly it sees.

@@ -7,10 +7,23 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 
+use super::ball::BallContact;
 use super::error::{SimError, not_negative, require, up_to};
 use super::random::{Drift, gauss, gauss_vector, uniform};
-use super::stylus::{Moment, TICK};
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
+
+/// What really was, at one instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Time since the start, s.
+    pub t: f64,
+    /// True centre of the ball and true orientation of the stylus.
+    pub pose_ot: Isometry3<f64>,
+    /// Force of the part on the stylus, N, in O.
+    pub force_o: Vector3<f64>,
+    /// Where the ball really touched; empty while it is free.
+    pub contacts: Vec<BallContact>,
+}
 
 /// Errors of sensors and transport. All noise is root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +106,8 @@ impl SensorParams {
 
 /// Largest clock offset that makes sense, s.
 const LARGEST_CLOCK: f64 = 1.0;
+/// Time between two moments, s: the wrench's period.
+pub(super) const TICK: f64 = 1e-3;
 /// Ticks between two poses.
 const POSE_EVERY: usize = 2;
 /// Jitter is cut off at this share of the period, so that stamps keep their order.

@@ -13,7 +13,7 @@ use super::ball::BallContact;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::path::Stroke;
 use super::random::Drift;
-use super::sensor::{Sensor, SensorParams};
+use super::sensor::{Moment, Sensor, SensorParams, TICK};
 use super::surface::Surface;
 use super::tip::SimTip;
 use touchup_core::numeric::turned_to;
@@ -80,19 +80,6 @@ impl StylusParams {
     }
 }
 
-/// What really was, at one instant.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
-    /// Time since the start, s.
-    pub t: f64,
-    /// True centre of the ball and true orientation of the stylus.
-    pub pose_ot: Isometry3<f64>,
-    /// Force of the part on the stylus, N, in O.
-    pub force_o: Vector3<f64>,
-    /// Where the ball really touched; empty while it is free.
-    pub contacts: Vec<BallContact>,
-}
-
 /// A simulated recording with the truth behind it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Touch {
@@ -106,8 +93,6 @@ pub struct Touch {
 const LARGEST_FORCE: f64 = 1e3;
 /// A tip that bends further is none, m; a sample may be a thousand times as far.
 const LARGEST_BEND: f64 = 1.0;
-/// Time between two moments, s: the wrench's period.
-pub(super) const TICK: f64 = 1e-3;
 /// The hand closes a distance with this rate, 1/s: a lag of 0.4 mm at 40 mm/s.
 const FOLLOW: f64 = 100.0;
 /// The hand is never faster than this, m/s.

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::ball::{BallContact, push_balls};
+use super::ball::{BallContact, TipBall, push_balls};
 use super::error::SimError;
 use super::surface::Surface;
 use touchup_core::stylus::{TipBody, TipShape};
@@ -19,15 +19,6 @@ const AROUND: usize = 48;
 const SHARP: f64 = 0.05e-3;
 /// Between two balls the tip is too small by this at most, m.
 const SCALLOP: f64 = 4e-6;
-
-/// One ball of a tip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TipBall {
-    /// middle from the origin of T, m, in T or O
-    pub offset: Vector3<f64>,
-    /// m
-    pub radius: f64,
-}
 
 /// A tip that is led over a surface.
 pub(super) struct SimTip {
