@@ -1,25 +1,9 @@
-//! The whole report, and the files it is handed over as.
-
-use std::collections::BTreeSet;
+//! The whole report.
 
 use serde::Serialize;
 
 use super::figure::{Chapter, Drawing, Figure, Table};
-use super::{csv, page, plot};
-
-/// Why a report cannot be written down.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// Two figures or tables would take one file.
-    #[error("two figures or tables are called {0}")]
-    SameName(String),
-    /// A name that is no plain file name.
-    #[error("{0:?} cannot be the name of a file: small letters, digits and _ alone")]
-    BadName(String),
-    /// The results have no JSON form.
-    #[error("the report cannot be written as JSON: {0}")]
-    Json(#[from] serde_json::Error),
-}
+use super::plot::Looks;
 
 /// Provenance of the measurements.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,51 +24,18 @@ pub struct Report {
     pub chapters: Vec<Chapter>,
 }
 
-/// One file of a report.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct OutputFile {
-    /// without folder
-    pub name: String,
-    /// what is in it
-    pub bytes: Vec<u8>,
-}
-
 impl Report {
-    /// `report.html`, `report.json`, and of each figure its SVG and CSV, of each table its CSV.
-    ///
-    /// # Errors
-    /// [`ReportError`]: names that are not plain, or there twice.
-    pub fn files(&self) -> Result<Vec<OutputFile>, ReportError> {
-        self.check_names()?;
-        let provenance = self.provenance();
-        let looks = self.looks();
-        let mut files = Vec::new();
-        let mut add = |id: &str, ending: &str, text: String| {
-            files.push(OutputFile { name: format!("{id}.{ending}"), bytes: text.into_bytes() });
-        };
-        add("report", "html", page::html(self));
-        add("report", "json", serde_json::to_string_pretty(self)? + "\n");
-        for figure in self.figures() {
-            add(&figure.id, "svg", plot::svg(figure, &looks, &provenance));
-            add(&figure.id, "csv", csv::of_figure(figure));
-        }
-        for table in self.tables() {
-            add(&table.id, "csv", csv::of_table(table));
-        }
-        Ok(files)
-    }
-
-    fn figures(&self) -> impl Iterator<Item = &Figure> {
+    pub(super) fn figures(&self) -> impl Iterator<Item = &Figure> {
         self.chapters.iter().flat_map(|chapter| &chapter.figures)
     }
 
-    fn tables(&self) -> impl Iterator<Item = &Table> {
+    pub(super) fn tables(&self) -> impl Iterator<Item = &Table> {
         self.advice.iter().chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
     }
 
     /// One look for each series, the same in all figures.
-    pub(super) fn looks(&self) -> plot::Looks {
-        plot::Looks::of(self.figures().filter_map(|figure| match &figure.drawing {
+    pub(super) fn looks(&self) -> Looks {
+        Looks::of(self.figures().filter_map(|figure| match &figure.drawing {
             Drawing::Curves(series) => Some(series.iter().map(|series| series.name.as_str()).collect()),
             Drawing::Maps { .. } => None,
         }))
@@ -93,19 +44,5 @@ impl Report {
     /// What every picture says about where it is from.
     pub(super) fn provenance(&self) -> String {
         format!("{} · commit {} · {}", self.machine, self.commit, self.command)
-    }
-
-    fn check_names(&self) -> Result<(), ReportError> {
-        let tables = self.tables().map(|table| &table.id);
-        let mut seen = BTreeSet::from(["report"]);
-        for id in self.figures().map(|figure| &figure.id).chain(tables) {
-            if id.is_empty() || !id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
-                return Err(ReportError::BadName(id.clone()));
-            }
-            if !seen.insert(id) {
-                return Err(ReportError::SameName(id.clone()));
-            }
-        }
-        Ok(())
     }
 }

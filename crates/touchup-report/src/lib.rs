@@ -10,6 +10,7 @@ mod csv;
 mod document;
 mod extremes;
 mod figure;
+mod files;
 mod number;
 mod page;
 pub mod peers;
@@ -23,11 +24,12 @@ pub use convergence::{
     BLOWN_UP, Convergence, Decay, Law, Line, MeshErrors, PaperSweeps, RobustSweeps, Rule, SweepError, SweepRun,
     convergence, fit_decay, noisy, raster_samples, straight_line,
 };
-pub use document::{OutputFile, Report, ReportError};
+pub use document::Report;
 pub use extremes::{Extreme, Extremes, extremes};
 pub use figure::{
     Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell, TableOf,
 };
+pub use files::{OutputFile, ReportError};
 pub use number::three_digits;
 pub use peers::Peers;
 pub use stability::{BadShape, FaceShares, Integrator, MeshShares, RunEnding, Stability, SubFlowError, stability};

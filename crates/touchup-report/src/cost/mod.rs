@@ -1,6 +1,7 @@
 //! What each stage costs, with and without each optional part, and for scans of every size.
 
 mod chapter;
+mod error;
 mod log_law;
 mod minimal;
 mod parts;
@@ -10,22 +11,15 @@ mod stages;
 mod turns;
 
 use super::Effort;
+pub use error::CostError;
 pub use log_law::LogLaw;
 pub use minimal::MinimalLoop;
 pub use parts::PartCost;
 pub use replay::{READING, ReplaySpeed};
-pub use sizes::SizeCost;
+pub use sizes::{BAREST, SizeCost};
 pub use stages::{SeldomCost, StageCost};
-use touchup_core::haptic::RefineError;
-use touchup_core::mesh::MeshError;
-use touchup_core::stylus::SettingError;
-use touchup_session::replay::ReplayError;
-use touchup_session::scene::SceneError;
 pub use turns::PerSample;
 use turns::Timing;
-
-/// The cheapest scene that moves a mesh: the touched face follows the ball, without further stages.
-pub const BAREST: &str = "tip:\nrefine: { roi_mm: 0, beta_per_n2_s: 0 }\n";
 
 /// The cheapest scene takes at most this many times as long as the loop that is written by hand.
 pub const LARGEST_RATIO: f64 = 1.05;
@@ -35,35 +29,6 @@ pub const LEAST_REPLAY_PER_S: f64 = 500_000.0;
 
 /// Sizes up to this one give the law that the larger ones are held against, faces.
 pub const LAW_UP_TO: usize = 105_000;
-
-/// Why costs could not be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum CostError {
-    /// The plate.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A push.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-    /// A setting of a stage.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The recording that is replayed.
-    #[error(transparent)]
-    Recording(#[from] ReplayError),
-    /// Nowhere to put it.
-    #[error("no temporary folder for a recording: {0}; name one with room by TMPDIR")]
-    Folder(std::io::Error),
-    /// A scene without `refine`.
-    #[error("a scene that moves nothing has no cost of a push: it needs `refine`, and `patch` for the patch")]
-    NothingMoves,
-    /// No block of samples.
-    #[error("nothing was timed: the raster of the ball is not on the plate, or has no samples")]
-    NothingTimed,
-}
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::ops::Sub;
 
-use super::CostError;
+use super::error::CostError;
 use super::sizes::{pushing, refiner_of, side_of, touched_plate};
 use super::turns::{PerSample, Timing, by_block, in_turns};
 use crate::Spread;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::sizes::{refiner_of, touched_plate};
+use super::error::CostError;
+use super::sizes::{BAREST, refiner_of, touched_plate};
 use super::turns::spread;
-use super::{BAREST, CostError};
 use crate::{Spread, timed};
 use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
 use touchup_io::recording::{Topics, write_recording};

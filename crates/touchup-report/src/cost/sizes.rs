@@ -2,15 +2,18 @@
 
 use std::ops::Div;
 
+use super::error::CostError;
 use super::minimal::MinimalLoop;
 use super::turns::{PerSample, TimedCase, Timing, by_block, in_turns};
-use super::{BAREST, CostError};
 use crate::{Spread, timed};
 use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::stylus::{Sample, WrenchFrame};
 use touchup_session::scene::Scene;
 use touchup_sim::wavy::{SIDE, plate, slide_on};
+
+/// The cheapest scene that moves a mesh: the touched face follows the ball, without further stages.
+pub const BAREST: &str = "tip:\nrefine: { roi_mm: 0, beta_per_n2_s: 0 }\n";
 
 /// Length of the short edges of a scan that grows with its faces, m.
 const EDGE: f64 = 1e-3;

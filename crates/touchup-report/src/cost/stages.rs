@@ -5,7 +5,7 @@ use std::io::Cursor;
 
 use nalgebra::{Point3, Vector3};
 
-use super::CostError;
+use super::error::CostError;
 use super::replay::messages;
 use super::sizes::{side_of, touched_plate};
 use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};

@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::ops::Range;
 use std::time::Instant;
 
-use super::CostError;
+use super::error::CostError;
 use crate::Spread;
 use crate::allocations::asked;
 

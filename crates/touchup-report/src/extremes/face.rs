@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{CaseOutcome, Extreme, extreme, refused};
+use super::case::{CaseOutcome, Extreme, extreme, refused};
 use touchup_core::haptic::{Along, DynamicsError, DynamicsParams, FaceDynamics, FaceState};
 
 /// The paper's h_min, m, and f_max, N, and α, m/(N·s), and δ.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::{CaseOutcome, Extreme, extreme, refused};
+use super::case::{CaseOutcome, Extreme, extreme, refused};
 use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{MeshError, TriMesh};
 use touchup_core::stylus::{Sample, SampleError, Wrench};

@@ -2,10 +2,9 @@
 
 use super::super::figure::{Figure, LineStroke, Mark, Series};
 use super::axis::Extent;
-use super::frame::Frame;
+use super::frame::{Frame, TOP, WIDTH};
 use super::style::{Look, Looks, text_width};
 use super::writer::Svg;
-use super::{TOP, WIDTH};
 
 /// Room on the left for the numbers and the name of the axis, pixels.
 const LEFT: f64 = 82.0;

@@ -4,6 +4,10 @@ use super::axis::{Extent, Tick};
 use super::style::text_width;
 use super::writer::Svg;
 
+/// Width of every picture, pixels.
+pub(super) const WIDTH: f64 = 900.0;
+/// From the upper edge to what is drawn: the title is between.
+pub(super) const TOP: f64 = 38.0;
 /// A label closer than this to the one before it is left out, pixels.
 const LEAST_GAP: f64 = 8.0;
 

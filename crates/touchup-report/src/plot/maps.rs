@@ -3,10 +3,9 @@
 use super::super::figure::{Axis, Figure, Panel, Scale};
 use super::super::number::{power_of_ten, three_digits};
 use super::axis::Tick;
-use super::frame::Frame;
+use super::frame::{Frame, TOP, WIDTH};
 use super::style::text_width;
 use super::writer::Svg;
-use super::{TOP, WIDTH};
 
 /// Room for the numbers and the name of the axis on the left, between grids, for the bar on the right, and below.
 const LEFT: f64 = 82.0;

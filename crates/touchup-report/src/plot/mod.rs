@@ -7,6 +7,7 @@ mod maps;
 mod style;
 mod writer;
 
+use frame::WIDTH;
 pub(super) use style::Looks;
 use style::text_width;
 use writer::Svg;
@@ -14,13 +15,8 @@ pub(super) use writer::escaped;
 
 use super::figure::{Drawing, Figure};
 
-/// Width of every picture, pixels.
-const WIDTH: f64 = 900.0;
 /// Size of the letters that say where it was measured.
 const SMALL: f64 = 10.5;
-/// From the upper edge to what is drawn: the title is between.
-const TOP: f64 = 38.0;
-
 /// The figure as a picture of its own. `provenance`, in small letters below it: where and by what it was measured.
 ///
 /// - `looks`: of its series.

@@ -3,8 +3,8 @@
 use std::fmt::Display;
 use std::time::{Duration, Instant};
 
-use super::WholeScanError;
 use super::contact_points::ContactSculptor;
+use super::error::WholeScanError;
 use super::gaussian::{GaussianParams, GaussianSurface};
 use super::part::{GivenPart, Part};
 use touchup_core::haptic::{RefineParams, RoiSize, StepRule};

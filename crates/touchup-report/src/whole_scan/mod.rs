@@ -11,53 +11,24 @@ mod gaussian;
 mod method;
 mod part;
 mod text;
+mod touched_error;
 
 use std::time::Duration;
 
 pub use contact_points::ContactSculptor;
-pub use error::TouchedError;
+pub use error::WholeScanError;
 pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
 pub use method::{Reach, RefineMethod};
 use method::{Run, RunLimits, run};
 pub use part::GivenPart;
 use part::{Part, parts};
+pub use touched_error::TouchedError;
 
 use super::convergence::straight_line;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
 use touchup_core::haptic::mean_edge;
-use touchup_core::mesh::{MeshError, TriMesh};
-use touchup_core::stylus::SettingError;
-use touchup_session::live::LiveError;
-use touchup_sim::SimError;
-
-/// Why whole scans were not measured.
-#[derive(Debug, thiserror::Error)]
-pub enum WholeScanError {
-    /// A simulated part.
-    #[error(transparent)]
-    Sim(#[from] SimError),
-    /// A setting of a given part.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// An engine that could not be built.
-    #[error(transparent)]
-    Engine(#[from] LiveError),
-    /// A patch that is too large.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// A scan that cannot be compared with the part.
-    #[error(transparent)]
-    Compare(#[from] CompareError),
-    /// Nothing to measure.
-    #[error("none of the {samples} samples of {name} touches the part: are they in its frame?")]
-    NothingTouched {
-        /// of the case
-        name: String,
-        /// how many there are
-        samples: usize,
-    },
-}
+use touchup_core::mesh::TriMesh;
 
 /// One method on one scan.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::{TouchedError, WholeScanError};
+use super::error::WholeScanError;
+use super::touched_error::TouchedError;
 use crate::Effort;
 use crate::convergence::region_over;
 use touchup_core::compare::{CompareError, TouchedRegion};
