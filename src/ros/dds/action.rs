@@ -17,11 +17,12 @@ use ros2_client::qos::{Durability, History};
 use ros2_client::{ActionServer, ActionTypeName, RmwRequestId};
 
 use super::answers::Room;
+use super::back_end::{DdsBackEnd, During};
+use super::graph::mapping;
 use super::incoming::Listener;
 use super::services::{SERVICE, unreadable};
 use super::topics::dds_name;
-use super::{DdsBackEnd, During, RosError, mapping};
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};

@@ -14,7 +14,6 @@ use ros2_client::{Context, ServiceMapping};
 
 use super::incoming::Listener;
 use super::keep_alive::{KeepAlive, LOOK_EVERY};
-use super::mapping;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
 use crate::ros::port::Arrival;
@@ -238,5 +237,13 @@ impl Listener for DdsGraph {
     }
     fn look_every(&self) -> Option<Duration> {
         self.keep_alive.as_ref().map(|_| LOOK_EVERY)
+    }
+}
+
+/// How services are carried, by the parameter.
+pub(super) fn mapping(config: &NodeConfig) -> ServiceMapping {
+    match config.parameters.string("service_mapping") {
+        "cyclone" => ServiceMapping::Cyclone,
+        _ => ServiceMapping::Enhanced,
     }
 }

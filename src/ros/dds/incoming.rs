@@ -10,8 +10,7 @@ use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
 use ros2_client::{Gid, Subscription};
 
-use super::RosError;
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 

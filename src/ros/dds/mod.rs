@@ -5,6 +5,7 @@
 
 mod action;
 mod answers;
+mod back_end;
 mod graph;
 mod incoming;
 mod keep_alive;
@@ -12,16 +13,15 @@ mod samples;
 mod services;
 mod topics;
 
-use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 
 use ros2_client::dds::rustdds;
-use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
+use ros2_client::{Node, NodeOptions};
 
 use self::answers::Room;
-use self::graph::DdsGraph;
-use self::incoming::Listener;
+use self::back_end::{DdsBackEnd, join};
+use self::graph::{DdsGraph, mapping};
 use super::arguments::NodeConfig;
 use super::exchange::{self, Exchange, Joined, RosError};
 use super::parameter_services;
@@ -29,31 +29,6 @@ use super::parameters::{PARAMETERS, ParameterValue, Parameters};
 use super::port::{Inbox, Port};
 use super::topics::{mesh, subscribe, urgent};
 pub use samples::samples;
-
-/// Says what DDS was asked for, where it refuses.
-trait During<T> {
-    fn during(self, call: &'static str) -> Result<T, RosError>;
-}
-
-impl<T, E: Debug> During<T> for Result<T, E> {
-    fn during(self, call: &'static str) -> Result<T, RosError> {
-        let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
-        self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
-    }
-}
-
-/// Publishes, subscribes and serves.
-struct DdsBackEnd<'a> {
-    config: &'a NodeConfig,
-    context: Context,
-    node: Node,
-    graph: DdsGraph,
-    exchange: Arc<Exchange>,
-    room: Arc<Room>,
-    /// of the services so far, absolute and remapped
-    names: Vec<String>,
-    listeners: Vec<Box<dyn Listener>>,
-}
 
 struct DdsConnection {
     exchange: Arc<Exchange>,
@@ -132,24 +107,4 @@ fn native(value: &ParameterValue) -> ros2_client::ParameterValue {
         ParameterValue::Double(number) => ros2_client::ParameterValue::Double(*number),
         ParameterValue::String(word) => ros2_client::ParameterValue::String(word.clone()),
     }
-}
-
-fn mapping(config: &NodeConfig) -> ServiceMapping {
-    match config.parameters.string("service_mapping") {
-        "cyclone" => ServiceMapping::Cyclone,
-        _ => ServiceMapping::Enhanced,
-    }
-}
-
-fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), RosError> {
-    let mut builder = rustdds::DomainParticipantBuilder::new(config.domain_id);
-    if config.localhost_only {
-        builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
-    }
-    let participant = builder.build().during("joining the domain")?;
-    let context = Context::from_domain_participant(participant).during("joining the graph")?;
-    let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
-    let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
-    let node = context.new_node(name, options).during("making the node")?;
-    Ok((context, node))
 }

@@ -7,9 +7,10 @@ use ros2_client::dds::rustdds::{
 };
 use ros2_client::{Node, NodeOptions, Publisher};
 
+use super::back_end::{During, join};
 use super::topics::{BEST_EFFORT, keep, make_topic};
-use super::{During, RosError, join};
 use crate::ros::arguments::NodeConfig;
+use crate::ros::exchange::RosError;
 use crate::ros::messages::{PoseStamped, RosMessage, WrenchStamped};
 use crate::ros::port::SamplePort;
 

@@ -12,10 +12,11 @@ use ros2_client::{Publisher, ReadError, ReadResult, RmwRequestId, ServiceMapping
 use serde::{Deserialize, Serialize};
 
 use super::answers::{Room, Shrinkable};
+use super::back_end::{DdsBackEnd, During};
+use super::graph::mapping;
 use super::incoming::Listener;
 use super::topics::dds_name;
-use super::{DdsBackEnd, During, RosError, mapping};
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::*;
 use crate::ros::port::{Arrival, Reply};
 use crate::ros::services::Serves;

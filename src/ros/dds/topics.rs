@@ -6,9 +6,9 @@ use ros2_client::dds::rustdds::{self, QosPolicyBuilder, TopicDescription, TopicK
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, WriteError};
 
+use super::back_end::{DdsBackEnd, During};
 use super::incoming::{HeardTopic, LastNumbers};
-use super::{DdsBackEnd, During, RosError};
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::{Arrival, TILES_KEPT};
 use crate::ros::send_queue::Sent;

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 use futures::{FutureExt, Stream, StreamExt};
 use r2r::{ActionServerCancelRequest, ActionServerGoal, ActionServerGoalRequest, Node};
 
+use super::back_end::{During, PollSource, source};
 use super::convert::Convert;
 use super::touchup_msgs::action::Probe::Action;
-use super::{During, PollSource, RosError, source};
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};

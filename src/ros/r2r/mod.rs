@@ -5,6 +5,7 @@
 //! reads the command line and the environment by itself, so names go to it as the node has them, not yet remapped.
 
 mod action;
+mod back_end;
 mod convert;
 mod graph;
 mod samples;
@@ -17,7 +18,6 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use futures::{FutureExt, Stream, StreamExt};
 #[cfg(not(feature = "r2r-check"))]
 use r2r::{std_srvs, touchup_msgs};
 #[cfg(feature = "r2r-check")]
@@ -32,48 +32,10 @@ use super::parameter_services::{self, raw};
 use super::parameters::ParameterValue;
 use super::port::{Arrival, Inbox, Port};
 use super::topics::{mesh, subscribe, urgent};
+use back_end::{During, PollSource, R2rBackEnd};
 use convert::Convert;
 use graph::R2rGraph;
 pub use samples::samples;
-
-/// Says what rcl was asked for, where it refuses.
-trait During<T> {
-    fn during(self, call: &'static str) -> Result<T, RosError>;
-}
-
-impl<T> During<T> for r2r::Result<T> {
-    fn during(self, call: &'static str) -> Result<T, RosError> {
-        let remedy = "is the workspace sourced that has touchup_msgs?";
-        self.map_err(|error| RosError::Refused { call, reason: error.to_string(), remedy })
-    }
-}
-
-/// Takes all that has come from one topic, service or action since it was called last; whether anything had.
-type PollSource = Box<dyn FnMut() -> bool + Send>;
-
-/// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so none is lost between two spins.
-fn source<S>(mut stream: S, mut take: impl FnMut(S::Item) + Send + 'static) -> PollSource
-where
-    S: Stream + Unpin + Send + 'static,
-{
-    Box::new(move || {
-        let mut has_come = false;
-        while let Some(Some(item)) = stream.next().now_or_never() {
-            take(item);
-            has_come = true;
-        }
-        has_come
-    })
-}
-
-/// Publishes, subscribes and serves.
-struct R2rBackEnd<'a> {
-    config: &'a NodeConfig,
-    node: r2r::Node,
-    graph: R2rGraph,
-    exchange: Arc<Exchange>,
-    sources: Vec<PollSource>,
-}
 
 struct R2rConnection {
     exchange: Arc<Exchange>,

@@ -2,10 +2,12 @@
 
 use r2r::{Publisher, WrappedTypesupport, geometry_msgs::msg as geometry};
 
+use super::back_end::During;
+use super::context;
 use super::convert::Convert;
 use super::topics::profile;
-use super::{During, RosError, context};
 use crate::ros::arguments::NodeConfig;
+use crate::ros::exchange::RosError;
 use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::SamplePort;
 use crate::ros::topics::Topic;

@@ -3,8 +3,9 @@
 use r2r::ServiceRequest;
 use r2r::qos::QosProfile;
 
+use super::back_end::{During, R2rBackEnd, source};
 use super::convert::{Convert, R2rService};
-use super::{During, R2rBackEnd, RosError, source};
+use crate::ros::exchange::RosError;
 use crate::ros::port::Reply;
 use crate::ros::services::Serves;
 

@@ -3,9 +3,9 @@
 use r2r::WrappedTypesupport;
 use r2r::qos::QosProfile;
 
+use super::back_end::{During, R2rBackEnd, source};
 use super::convert::Convert;
-use super::{During, R2rBackEnd, RosError, source};
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 use crate::ros::send_queue::Sent;

@@ -1,0 +1,52 @@
+//! The node while it begins: topics, services and the action are added to it.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use ros2_client::dds::rustdds;
+use ros2_client::{Context, Node, NodeName, NodeOptions};
+
+use super::answers::Room;
+use super::graph::DdsGraph;
+use super::incoming::Listener;
+use crate::ros::arguments::NodeConfig;
+use crate::ros::exchange::{Exchange, RosError};
+
+/// Says what DDS was asked for, where it refuses.
+pub(super) trait During<T> {
+    fn during(self, call: &'static str) -> Result<T, RosError>;
+}
+
+impl<T, E: Debug> During<T> for Result<T, E> {
+    fn during(self, call: &'static str) -> Result<T, RosError> {
+        let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
+        self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
+    }
+}
+
+/// Publishes, subscribes and serves.
+pub(super) struct DdsBackEnd<'a> {
+    pub config: &'a NodeConfig,
+    pub context: Context,
+    pub node: Node,
+    pub graph: DdsGraph,
+    pub exchange: Arc<Exchange>,
+    pub room: Arc<Room>,
+    /// of the services so far, absolute and remapped
+    pub names: Vec<String>,
+    pub listeners: Vec<Box<dyn Listener>>,
+}
+
+/// Joins the network as a node that does nothing yet.
+pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), RosError> {
+    let mut builder = rustdds::DomainParticipantBuilder::new(config.domain_id);
+    if config.localhost_only {
+        builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
+    }
+    let participant = builder.build().during("joining the domain")?;
+    let context = Context::from_domain_participant(participant).during("joining the graph")?;
+    let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
+    let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
+    let node = context.new_node(name, options).during("making the node")?;
+    Ok((context, node))
+}
