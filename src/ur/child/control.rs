@@ -7,7 +7,9 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use super::{ChildError, ChildShared, failure};
+use super::error::{ChildError, failure};
+use super::library::Control;
+use super::shared::ChildShared;
 use crate::clock::Clock;
 use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order};
 
@@ -49,38 +51,6 @@ enum Doing {
     Moving,
     Pressing { frame: [f64; 6], force: f64, speed: f64 },
     Braking { deceleration: f64, since: Instant },
-}
-
-/// What of ur-rtde a driver calls, from one thread alone. A call returns when the library does.
-pub trait Control {
-    /// Whether the library has a connection.
-    fn is_connected(&self) -> bool;
-    /// Whether the uploaded program runs; an old answer when the connection is lost.
-    fn is_running(&self) -> bool;
-    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next command.
-    fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError>;
-    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off across, m and rad.
-    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError>;
-    /// Ends pressing. A velocity that was not stopped before goes on.
-    fn end_press(&self) -> Result<(), ChildError>;
-    /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm is at rest.
-    fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError>;
-    /// Zeroes the sensor.
-    fn zero(&self) -> Result<(), ChildError>;
-    /// kg, and m in the flange.
-    fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError>;
-    /// The tip in the flange.
-    fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError>;
-    /// The tip in the flange, as the controller has it.
-    fn tool(&self) -> Result<[f64; 6], ChildError>;
-    /// Compliance of force mode.
-    fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError>;
-    /// Has the controller stop when it hears less often.
-    fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError>;
-    /// Lets the watchdog hear something.
-    fn feed(&self) -> Result<(), ChildError>;
-    /// Ends the program of the controller.
-    fn end_program(&self) -> Result<(), ChildError>;
 }
 
 /// Why a driver ends before its orders do.

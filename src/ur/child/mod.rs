@@ -5,69 +5,27 @@
 //! once, for the library would connect again by itself, start its program unasked, and crash.
 
 mod control;
+mod error;
 mod library;
+mod shared;
 mod states;
 
-use std::io::{BufRead, BufReader, PipeWriter, Write, stdin, stdout};
+use std::io::{BufRead, BufReader, stdin, stdout};
 use std::os::fd::AsFd;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::channel;
-use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use pyo3::prelude::*;
 
 use self::control::{Driver, DriverEnd};
+pub use self::error::ChildError;
+use self::error::failure;
 use self::library::{Receive, RtdeControl, leave};
-use super::protocol::{Begin, ClientReport, Link, Order, UrState};
+use self::shared::ChildShared;
+use super::protocol::{Begin, ClientReport, Order};
 use crate::clock::Clock;
-
-/// Why the process gives up before it has begun.
-#[derive(Debug, thiserror::Error)]
-pub enum ChildError {
-    /// It is started by touchup, with its orders on stdin.
-    #[error("this is started by touchup itself: the first line on stdin has to be an order to begin ({0})")]
-    NoOrders(String),
-    /// A call of Python.
-    #[error("{call}: {reason}")]
-    Python {
-        /// which
-        call: &'static str,
-        /// what it raised
-        reason: String,
-    },
-}
-
-/// Shared by the threads.
-struct ChildShared {
-    reports: Mutex<PipeWriter>,
-    /// number of the last order whose calls have returned
-    served: AtomicU64,
-    latest: Mutex<Option<UrState>>,
-}
-
-impl ChildShared {
-    fn report(&self, report: &ClientReport) {
-        let Ok(mut line) = serde_json::to_vec(report) else { return };
-        line.push(b'\n');
-        // when the reader is gone, stdin ends too
-        let _ = self.reports.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
-    }
-
-    fn latest(&self) -> Option<UrState> {
-        *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Reports a lost connection, and ends the process.
-    fn lost(&self, which: Link) -> ! {
-        self.report(&ClientReport::Lost { which });
-        leave(3)
-    }
-
-    fn number(&self) -> u64 {
-        self.served.load(Ordering::Acquire)
-    }
-}
 
 /// Serves orders until stdin ends; then brakes, ends the program of the controller and itself.
 ///
@@ -117,16 +75,6 @@ pub fn run() -> Result<(), ChildError> {
             }
         }
     })
-}
-
-/// A call that did not work, as a report.
-fn failure(error: &ChildError) -> ClientReport {
-    match error {
-        ChildError::Python { call, reason } => {
-            ClientReport::Failed { call: (*call).to_owned(), reason: reason.clone() }
-        }
-        ChildError::NoOrders(reason) => ClientReport::Failed { call: "the orders".to_owned(), reason: reason.clone() },
-    }
 }
 
 /// Version of the Python that this was linked with, as `3.11`.

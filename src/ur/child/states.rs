@@ -4,8 +4,8 @@ use std::sync::PoisonError;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::ChildShared;
 use super::library::Receive;
+use super::shared::ChildShared;
 use crate::clock::{Clock, ManualClock};
 use crate::ur::protocol::{ClientReport, Link, UrState};
 
