@@ -6,15 +6,14 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nalgebra::{Isometry3, Point3, Vector3};
-use serde::Serialize;
+use nalgebra::{Isometry3, Point3};
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
-use self::table::ComparisonReport;
+use self::table::{CompareReport, ComparisonReport, ShapeReport, diagonal};
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, check_outputs, print_report, reported};
+use super::{CliError, Losses, Threads, check_outputs, print_report};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
     colour_of, compare as compare_shapes,
@@ -100,37 +99,6 @@ enum Align {
     Features,
     /// By points picked on both, in the file PAIRS
     Pairs,
-}
-
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-pub(super) struct CompareReport {
-    mesh: ShapeReport,
-    truth: ShapeReport,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    alignment: Option<Alignment>,
-    /// the scan, with --before
-    #[serde(skip_serializing_if = "Option::is_none")]
-    before: Option<ComparisonReport>,
-    /// the mesh
-    after: ComparisonReport,
-}
-
-reported! {
-    #[derive(Debug, Serialize)]
-    struct ShapeReport, fn of(path: &Path, mesh: &TriMesh) {
-        file: String = path.display().to_string(),
-        vertices: usize = mesh.vertex_count(),
-        faces: usize = mesh.face_count(),
-        /// sides of the box around it
-        size_mm: [f64; 3] = (diagonal(mesh) * 1e3).into(),
-    }
-}
-
-/// From the lowest to the highest corner of the box around a mesh, m.
-fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
-    let [low, high] = mesh.bounds();
-    high - low
 }
 
 /// A mesh that was read, brought into the frame of the truth.

@@ -30,10 +30,10 @@ pub(super) struct DemoArguments {
     /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
     /// summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
-    pub(super) out: PathBuf,
+    out: PathBuf,
     /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(super) seed: u64,
+    seed: u64,
     /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png, touches.png)
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
@@ -69,7 +69,7 @@ reported! {
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     match arguments.robot {
         None => {}
-        Some(RobotName::Sim) => return demo_robot(arguments),
+        Some(RobotName::Sim) => return demo_robot(&arguments.out, arguments.seed),
         Some(RobotName::Ur) => return Err(CliError::Usage("the demo has a simulated arm: --robot sim".to_owned())),
     }
     let plate = Plate::default();

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt;
 use std::io::Write;
+use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -10,7 +11,6 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::compare::{CompareArguments, compared};
-use super::demo::DemoArguments;
 use super::found::kind_of;
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
@@ -53,14 +53,14 @@ reported! {
     }
 }
 
-pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> {
+/// - `seed`: of the scan, the clicks and the arm.
+pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let plate = Plate::default();
-    let out = &arguments.out;
     create_folder(out).map_err(not_written(out))?;
     let [truth_path, scan_path, scene_path] = ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
     let truth = plate.mesh(CHORD_ERROR)?;
     let scanning = WorkProgress::stage("scan");
-    let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
+    let scanner = ScannerParams { seed, ..ScannerParams::default() };
     let scanned = scan(&plate, &scanner)?;
     drop(scanning);
     for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
@@ -69,7 +69,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes())).map_err(not_written(&scene_path))?;
 
     let features = plate.features();
-    let mut rng = Pcg64::seed_from_u64(arguments.seed);
+    let mut rng = Pcg64::seed_from_u64(seed);
     let flags: Vec<Flag> = (1..).zip(&features).map(|(id, feature)| clicked(id, feature, &mut rng)).collect();
     let probing = Probing {
         scene: &scene_path,
@@ -81,7 +81,7 @@ pub(super) fn demo_robot(arguments: &DemoArguments) -> Result<Losses, CliError> 
     };
     let ready = probing.ready()?;
     let start = ready.cell.above(&truth);
-    let mut arm = SimArm::new(&plate, ready.simulated_arm(arguments.seed), &start)?;
+    let mut arm = SimArm::new(&plate, ready.simulated_arm(seed), &start)?;
     probing.planned(&ready, &mut arm)?;
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 

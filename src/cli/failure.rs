@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use super::CliError;
+use super::error::CliError;
 
 /// Why a command ended with another exit code than 0.
 #[derive(Debug, Serialize)]

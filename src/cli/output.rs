@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::CliError;
+use super::error::CliError;
 use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
 
 /// One line, or several, on stdout. A reader that has gone away is no error of ours.

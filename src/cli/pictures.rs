@@ -6,7 +6,7 @@ use std::time::SystemTime;
 use chrono::{DateTime, Utc};
 use nalgebra::Vector3;
 
-use super::CliError;
+use super::error::CliError;
 use super::output::not_written;
 use crate::compare::{PicturePanel, PictureParams, Rgb, draw_picture};
 use crate::io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};

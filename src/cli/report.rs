@@ -2,12 +2,11 @@
 
 use std::ffi::OsString;
 use std::io::ErrorKind;
-use std::path::PathBuf;
 use std::process::Command;
 
 use clap::Args;
 
-use super::{CliError, Losses};
+use super::error::{CliError, Losses, NoReport};
 
 /// The program, beside this one or on the path.
 const PROGRAM: &str = "touchup-report";
@@ -17,25 +16,6 @@ pub(super) struct HandedOver {
     /// Those of `touchup-report`; --help lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
-}
-
-/// Why there is no report.
-#[derive(Debug, thiserror::Error)]
-pub enum NoReport {
-    /// It is not installed.
-    #[error(
-        "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
-         touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without"
-    )]
-    Missing,
-    /// It does not start.
-    #[error("cannot start {}: {source}", path.display())]
-    Start {
-        /// the program
-        path: PathBuf,
-        /// why not
-        source: std::io::Error,
-    },
 }
 
 /// The verb: ends with the exit code of that program.

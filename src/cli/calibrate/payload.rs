@@ -10,7 +10,7 @@ use tracing::warn;
 
 use super::super::arm::{CellArguments, RobotName, TruePayload};
 use super::super::{CliError, Losses, reported};
-use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, payload_by_arm, rounded};
+use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded};
 use crate::calibrate::{PayloadFit, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, fit_payload};
 use crate::io::static_poses::read_static_poses;
 use crate::scene::{GravityAxes, PayloadSection, Scene, Setting};
@@ -37,7 +37,7 @@ pub(in crate::cli) struct PayloadArguments {
     wrench_axes: Option<Axes>,
     /// Acceleration of gravity, by which the weight is divided
     #[arg(long, value_name = "G", default_value = "9.81")]
-    pub(super) gravity_m_per_s2: f64,
+    gravity_m_per_s2: f64,
     #[command(flatten)]
     source: CalibrationRecording,
     #[command(flatten)]
@@ -57,13 +57,7 @@ const UNEXPLAINED: f64 = 5.0;
 
 /// The verb.
 pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> {
-    let gravity = arguments.gravity_m_per_s2;
-    if !(1.0..=100.0).contains(&gravity) {
-        return Err(CliError::Usage(format!("--gravity-m-per-s2 is {gravity}; it must be 1 to 100 m/s²")));
-    }
-    if let Some(robot) = arguments.robot {
-        return payload_by_arm::payload(arguments, robot);
-    }
+    let gravity = arguments.gravity()?;
     let bag = arguments.bag.as_ref().map(|bag| ("--bag", bag));
     let samples = arguments.samples.as_ref().map(|samples| ("--samples", samples));
     let (flag, path) = bag.or(samples).expect("one of --bag, --samples and --robot is there");
@@ -90,6 +84,15 @@ pub(super) fn warn_of_residuals(fit: &PayloadFit, besides: &str) {
 }
 
 impl PayloadArguments {
+    /// The acceleration of gravity, m/s².
+    pub(super) fn gravity(&self) -> Result<f64, CliError> {
+        let gravity = self.gravity_m_per_s2;
+        if !(1.0..=100.0).contains(&gravity) {
+            return Err(CliError::Usage(format!("--gravity-m-per-s2 is {gravity}; it must be 1 to 100 m/s²")));
+        }
+        Ok(gravity)
+    }
+
     fn poses(&self, path: &Path, draft: &DraftScene) -> Result<(Vec<StaticPose>, WrenchFrame, Losses), CliError> {
         let named = self.wrench_axes.map(|axes| match axes {
             Axes::Sensor => WrenchFrame::Sensor,

@@ -19,13 +19,14 @@ use crate::sim::ArmParams;
 
 /// The verb.
 pub(super) fn payload(arguments: &PayloadArguments, robot: RobotName) -> Result<Losses, CliError> {
+    let gravity = arguments.gravity()?;
     let PayloadArguments { cell, truth_payload, target, .. } = arguments;
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
     let stage = "identify the payload";
     let (readings, _) = cell.measure(robot, scene, stage, truth, |prober| prober.measure_payload())?;
     let PayloadReadings { segments, not_reached } = readings;
-    let params = PayloadParams { gravity: arguments.gravity_m_per_s2, ..PayloadParams::default() };
+    let params = PayloadParams { gravity, ..PayloadParams::default() };
     let fit = fit_payload(&segments, &params).map_err(|error| CliError::Arm(advice(&error)))?;
     warn_of_residuals(&fit, "does a hose pull, ");
     let payload = PayloadFound::of(&fit, ["flange", "base"]);

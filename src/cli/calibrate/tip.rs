@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::super::arm::{CellArguments, RobotName};
 use super::super::{CliError, Losses, reported};
-use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded, tip_by_arm};
+use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded};
 use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
 use crate::scene::{Scene, Setting};
 
@@ -65,10 +65,7 @@ impl Swing {
 
 /// The verb.
 pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
-    let TipArguments { bag, robot, spot, source, target, .. } = arguments;
-    if let (Some(robot), Some(spot)) = (robot, spot) {
-        return tip_by_arm::tip(arguments, *robot, spot);
-    }
+    let TipArguments { bag, source, target, .. } = arguments;
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };

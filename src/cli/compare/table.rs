@@ -1,13 +1,46 @@
 //! A comparison as JSON in mm, and as a table.
 
 use std::fmt;
+use std::path::Path;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::alignment::Alignment;
-use super::{CompareReport, ShapeReport};
 use crate::cli::{counted, reported};
 use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
+use crate::mesh::TriMesh;
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+pub(in crate::cli) struct CompareReport {
+    pub(super) mesh: ShapeReport,
+    pub(super) truth: ShapeReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) alignment: Option<Alignment>,
+    /// the scan, with --before
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) before: Option<ComparisonReport>,
+    /// the mesh
+    pub(super) after: ComparisonReport,
+}
+
+reported! {
+    #[derive(Debug, Serialize)]
+    pub(super) struct ShapeReport, pub fn of(path: &Path, mesh: &TriMesh) {
+        file: String = path.display().to_string(),
+        vertices: usize = mesh.vertex_count(),
+        faces: usize = mesh.face_count(),
+        /// sides of the box around it
+        size_mm: [f64; 3] = (diagonal(mesh) * 1e3).into(),
+    }
+}
+
+/// From the lowest to the highest corner of the box around a mesh, m.
+pub(super) fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
+    let [low, high] = mesh.bounds();
+    high - low
+}
 
 reported! {
     /// What `--json` prints of one mesh.

@@ -1,0 +1,36 @@
+//! Numbers as a calibration shows them, and as it writes them.
+
+use std::fmt::{self, Display};
+
+use serde::Serialize;
+
+use crate::calibrate::VectorEstimate;
+
+/// A value of three components as JSON has it, and its standard uncertainty.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Vector {
+    pub value: [f64; 3],
+    std: [f64; 3],
+}
+
+impl Vector {
+    /// - `unit`: how many of the unit are one of SI.
+    pub fn of(known: &VectorEstimate, unit: f64) -> Self {
+        Self { value: (known.value * unit).into(), std: (known.sigma * unit).into() }
+    }
+}
+
+impl Display for Vector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = f.precision().unwrap_or(4);
+        let pair = |(x, s): (&f64, &f64)| format!("{x:+.digits$} ± {s:.digits$}");
+        f.write_str(&self.value.iter().zip(&self.std).map(pair).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// As many digits as a scene needs: 1e-7 mm and 1e-10 of the other units are far below any noise.
+pub(super) fn rounded(x: f64, digits: i32) -> f64 {
+    let scale = 10f64.powi(digits);
+    // no negative zero in a file for people
+    (x * scale).round() / scale + 0.0
+}

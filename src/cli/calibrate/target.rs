@@ -1,0 +1,99 @@
+//! Where the result of a calibration goes: into a scene.
+
+use std::fmt::Display;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::cli::{CliError, check_kept, not_written, print_report};
+use crate::io::atomic::write_atomically;
+use crate::scene::{Scene, Setting};
+
+/// Error of a calibration with an arm but without a scene.
+const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
+
+/// Where the result goes, and how it is printed.
+#[derive(Debug, Args)]
+pub(super) struct CalibrationTarget {
+    /// The scene to put the result into: all else in it stays as written. Default: a new file
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    /// Where the scene goes; may be the one that --scene names
+    #[arg(long, value_name = "YAML")]
+    pub out: PathBuf,
+    /// Prints the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A scene with its text.
+pub(super) struct DraftScene {
+    text: String,
+    /// what the text says
+    pub scene: Scene,
+}
+
+impl DraftScene {
+    /// The settings by which a recording is read: those of the scene, or the default ones where there is none.
+    pub fn reading(&self) -> Scene {
+        if self.text.is_empty() { Scene::default() } else { self.scene.clone() }
+    }
+}
+
+impl CalibrationTarget {
+    /// Refuses to write over `input`, and reads the scene.
+    pub fn open(&self, flag: &str, input: &Path) -> Result<DraftScene, CliError> {
+        check_kept(flag, input, &self.out)?;
+        self.open_scene()
+    }
+
+    /// Reads the scene.
+    fn open_scene(&self) -> Result<DraftScene, CliError> {
+        let Some(path) = &self.scene else {
+            return Ok(DraftScene { text: String::new(), scene: Scene::from_yaml("{}")? });
+        };
+        let (scene, text) = Scene::read_with_text(path)?;
+        Ok(DraftScene { text, scene })
+    }
+
+    /// Reads the scene, which a calibration with an arm needs, and returns its path too.
+    pub fn open_for_arm(&self) -> Result<(&Path, DraftScene), CliError> {
+        let scene = self.scene.as_deref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
+        Ok((scene, self.open_scene()?))
+    }
+
+    /// Puts `found` into the scene and prints what it was.
+    pub fn write(
+        &self,
+        draft: &DraftScene,
+        change: &Change,
+        found: &(impl Serialize + Display),
+    ) -> Result<(), CliError> {
+        let Change { settings, remark, expected } = change;
+        let start = match draft.text.as_str() {
+            "" => format!("{}\n", new_file(found)),
+            text => text.to_owned(),
+        };
+        let text = Scene::edited(&start, settings, remark, expected)?;
+        write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
+        print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()));
+        Ok(())
+    }
+}
+
+/// The source of the result, as comments above it.
+fn new_file(found: &impl Display) -> String {
+    let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
+    lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+}
+
+/// The change of the scene by a calibration.
+pub(super) struct Change {
+    pub settings: Vec<Setting>,
+    /// its source, in one line
+    pub remark: String,
+    /// the scene with it
+    pub expected: Scene,
+}
