@@ -1,5 +1,6 @@
-//! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference that a room may not make, and on
-//! files, threads, clock, environment or printing in a crate that is pure. Comments, strings and inline tests do not count.
+//! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference that a room may not make, on files of
+//! a crate that use one another in a circle, and on files, threads, clock, environment or printing in a crate that is pure. Comments,
+//! strings and inline tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -340,9 +341,6 @@ fn sources(folder: &str) -> Vec<(String, String)> {
     found
 }
 
-/// Rooms without circles between their files.
-const WITHOUT_CIRCLES: &[&str] = &["crates/touchup-core/src"];
-
 /// The modules of one crate by their path from its root, each with the tokens of its code.
 type Modules<'a> = BTreeMap<Vec<&'a str>, Vec<&'a str>>;
 
@@ -372,38 +370,45 @@ fn paths_at<'a>(tokens: &[&'a str], at: &mut usize, before: &[&'a str]) -> Vec<V
     vec![path]
 }
 
-/// What a module names of its crate, as paths from the root: what it uses, and by which name it gives on what.
+/// What a module names of its crate, as paths from the root: what it uses, and what it has by `use`, of other crates too.
 fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> (Vec<Vec<&'a str>>, Vec<Vec<&'a str>>) {
     let tokens = &modules[module];
-    let (mut used, mut given_on) = (Vec::new(), Vec::new());
+    let (mut used, mut imported) = (Vec::new(), Vec::new());
     let (mut at, mut is_public) = (0, false);
     while at < tokens.len() {
         let begins = at == 0 || tokens[at - 1] != "::";
-        let child = [module, &[tokens[at]]].concat();
-        let is_local = modules.contains_key(&child) && (tokens.get(at + 1) == Some(&"::") || tokens[at - 1] == "use");
-        let is_path = matches!(tokens[at], "crate" | "super" | "self") && tokens.get(at + 1) == Some(&"::");
+        let is_use = at > 0 && tokens[at - 1] == "use";
+        let is_own = |first: &'a str| modules.contains_key(&[module, &[first]].concat());
+        let is_visibility = tokens[..at].ends_with(&["pub", "(", "in"]);
+        let is_path = !is_visibility && matches!(tokens[at], "crate" | "super" | "self") || is_own(tokens[at]);
         match tokens[at] {
             "pub" => is_public = true,
             "fn" | "mod" | "struct" | ";" | "{" => is_public = false,
             _ => {}
         }
-        if !(begins && at > 0 && (is_local || is_path)) {
+        if !(is_use || begins && at > 0 && is_path && tokens.get(at + 1) == Some(&"::")) {
             at += 1;
             continue;
         }
-        let is_use = tokens[at - 1] == "use";
         for path in paths_at(tokens, &mut at, &[]) {
             let supers = path.iter().take_while(|part| **part == "super").count();
-            let path = match path[0] {
-                "crate" => path[1..].to_vec(),
-                "super" => [&module[..module.len() - supers], &path[supers..]].concat(),
-                "self" => [module, &path[1..]].concat(),
-                _ => [module, &path].concat(),
+            let mut path = match path.first() {
+                Some(&"crate") => path[1..].to_vec(),
+                Some(&"super") => [&module[..module.len() - supers], &path[supers..]].concat(),
+                Some(&"self") => [module, &path[1..]].concat(),
+                Some(&first) if is_own(first) => [module, &path].concat(),
+                _ => [&["::"], &path[..]].concat(),
             };
-            if is_use && is_public { &mut given_on } else { &mut used }.push(path);
+            path.pop_if(|last| *last == "self");
+            if is_use && path.last().is_some_and(|last| *last != "*") {
+                imported.push(path.clone());
+            }
+            if !(is_use && is_public) && path.first() != Some(&"::") {
+                used.push(path);
+            }
         }
     }
-    (used, given_on)
+    (used, imported)
 }
 
 /// The module that a file below `src` is.
@@ -412,37 +417,38 @@ fn module_in(file: &str) -> Vec<&str> {
     if path == "lib" { Vec::new() } else { path.split('/').collect() }
 }
 
-/// The module in which what a path names is defined: its longest start that is one, through what modules give on.
+/// The module in which what a path names is defined: its longest start that is one, through what modules import, for themselves or
+/// for others; the root, which uses none, for what is of another crate.
 fn module_of<'a>(
     path: &[&'a str],
     modules: &Modules<'a>,
-    given_on: &BTreeMap<Vec<&'a str>, Vec<&'a str>>,
+    imported: &BTreeMap<Vec<&'a str>, Vec<&'a str>>,
 ) -> Vec<&'a str> {
     let mut path = path.to_vec();
     loop {
         let depth = (0..=path.len()).rev().find(|&depth| modules.contains_key(&path[..depth])).unwrap_or(0);
         let named = path.len().min(depth + 1);
-        match given_on.get(&path[..named]) {
+        match imported.get(&path[..named]) {
             Some(origin) if named > depth && *origin != path[..named] => path = [origin, &path[named..]].concat(),
             _ => return path[..depth].to_vec(),
         }
     }
 }
 
-/// Modules of one room that use one another in a circle, each with one that it uses.
+/// Modules of one crate that use one another in a circle, each with those that it uses.
 ///
 /// - `sources`: paths below `src` and code.
 fn circles(sources: &[(String, String)]) -> Vec<String> {
     let modules: Modules = sources.iter().map(|(file, code)| (module_in(file), tokens(code))).collect();
     let paths: Vec<_> = modules.keys().map(|name| (name, paths_of(name, &modules))).collect();
-    let given_on = paths.iter().flat_map(|(name, (_, given_on))| {
-        given_on.iter().map(|origin| ([name, &origin[origin.len() - 1..]].concat(), origin.clone()))
+    let imported = paths.iter().flat_map(|(name, (_, imported))| {
+        imported.iter().map(|origin| ([name, &origin[origin.len() - 1..]].concat(), origin.clone()))
     });
-    let given_on: BTreeMap<_, _> = given_on.collect();
+    let imported: BTreeMap<_, _> = imported.collect();
     let mut uses: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
     for (name, (used, _)) in &paths {
-        let others = used.iter().map(|path| module_of(path, &modules, &given_on));
-        uses.insert((*name).clone(), others.filter(|other| other != *name && other.first() == name.first()).collect());
+        let others = used.iter().map(|path| module_of(path, &modules, &imported));
+        uses.insert((*name).clone(), others.filter(|other| other != *name).collect());
     }
     // who is used by nobody left, or uses nobody left, is in no circle
     loop {
@@ -540,9 +546,11 @@ fn what_is_allowed_is_let_through() {
 }
 
 #[test]
-fn files_of_a_room_use_one_another_one_way() {
-    for folder in WITHOUT_CIRCLES {
-        let files: Vec<_> = sources(folder).into_iter().map(|(file, source)| (file, code_of(&source))).collect();
+fn files_of_a_crate_use_one_another_one_way() {
+    let crates = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("crates")).unwrap();
+    let crates = crates.map(|entry| format!("crates/{}/src", entry.unwrap().file_name().display()));
+    for folder in crates.chain(["src".to_owned()]) {
+        let files: Vec<_> = sources(&folder).into_iter().map(|(file, source)| (file, code_of(&source))).collect();
         let found = circles(&files);
         assert!(found.is_empty(), "{folder} has circles:\n{}", found.join("\n"));
     }
@@ -560,6 +568,11 @@ fn a_circle_is_found_however_it_is_closed() {
     assert_eq!(room("use crate::mesh::{b::{B, C}, D};", "use super::{A};", "mod a; mod b; pub use a::A;"), 2);
     assert_eq!(room("use super::Own;", "", "mod a; mod b; use a::A; pub struct Own;"), 2, "parent and child");
     assert_eq!(room("use super::Own;", "", "mod a; mod b; fn f() { a::f() } pub struct Own;"), 2);
+    let imports = "mod a; mod b; use a::A; use b::B; use serde::Serialize;";
+    assert_eq!(room("use super::B;", "use super::A;", imports), 2, "through what the parent has for itself");
+    let files = [("lib.rs", "mod a; mod b;"), ("a.rs", "use super::b::B;"), ("b.rs", "use crate::a::A;")];
+    assert_eq!(circles(&files.map(|(file, code)| (file.to_owned(), code.to_owned()))).len(), 2, "from room to room");
     assert_eq!(room("use super::b::B;", "", gives_on), 0);
+    assert_eq!(room("use super::{B, Serialize}; pub(in crate::mesh) struct A;", "", imports), 0);
     assert_eq!(room("use super::Own; use super::B;", "", "mod a; mod b; pub use a::A; pub struct Own;"), 0);
 }
