@@ -269,11 +269,11 @@ fn the_same_samples_make_the_same_mesh() {
 fn other_tips_hands_and_friction() {
     let seeds = either(1, 20);
     let styli = [
-        ("1.5 mm", StylusParams::default()),
         ("1 mm", StylusParams { radius: 1e-3, ..StylusParams::default() }),
         ("flat, 1.5 mm", StylusParams { shape: FLAT, ..StylusParams::default() }),
         ("cone, 20°", StylusParams { shape: CONE, radius: 0.5e-3, ..StylusParams::default() }),
-        // the others belong to the slow proofs
+        // the others belong to the slow proofs; of the first the tests above measure a recording
+        ("1.5 mm", StylusParams::default()),
         ("2.5 mm", StylusParams { radius: 2.5e-3, ..StylusParams::default() }),
         ("friction 0.05", StylusParams { friction: 0.05, ..StylusParams::default() }),
         ("friction 0.35", StylusParams { friction: 0.35, ..StylusParams::default() }),
@@ -285,7 +285,7 @@ fn other_tips_hands_and_friction() {
     println!("mean distances, mm, from the part to the mesh and back; rims, m");
     // all of them are measured before one of them fails
     let mut wrong = Vec::new();
-    for &(name, ref stylus) in &styli[..either(4, styli.len())] {
+    for &(name, ref stylus) in &styli[..either(3, styli.len())] {
         // a cone gets through no hole, and leaves the slot open, whose floor it does not reach
         let is_cone = name.starts_with("cone");
         let opened = if is_cone { "slot" } else { "through-hole" };

@@ -9,6 +9,8 @@ use serde_json::Value;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use touchup::sim::{Plate, ScannerParams, Surface, scan};
 
+use crate::full::either;
+
 fn touchup(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).output().unwrap()
 }
@@ -39,8 +41,8 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
 /// fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
 #[test]
 fn the_arm_of_the_demo_finds_every_feature() {
-    // with seed 8 the ball slides over a rim first, and one touch alone measures an end of the slot
-    for seed in ["1", "8"] {
+    // with seed 8, one of the slow proofs, the ball slides over a rim first, and one touch alone measures an end of the slot
+    for seed in &["1", "8"][..either(1, 2)] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
         let done = touchup(&["demo", "--robot", "sim", "--seed", seed, "--out", out]);
