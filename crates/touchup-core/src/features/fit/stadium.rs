@@ -36,7 +36,7 @@ pub struct Stadium {
     /// From wall to wall, m.
     pub width: f64,
     /// From end to end, over all, m; not less than the width where the ends are round. After a fit that leaves it
-    /// undetermined it only says how far no end is: see [`Fit::length`].
+    /// undetermined it only says how far no end is, and [`super::Fit::std`] has no figure of it.
     pub length: f64,
     /// What closes it.
     pub ends: Ends,
