@@ -157,7 +157,7 @@ def test_a_feature_mirrors_the_file_of_features():
 
 def test_kinds_are_those_of_the_program():
     source = (ROOT / "crates/touchup-core/src/features/feature.rs").read_text()
-    kinds = re.findall(r"Self::\w+ => \"(\w+)\"", source)
+    kinds = re.findall(r"^ *\w+ = \"(\w+)\",$", re.search(r"pub enum Kind \{(.*?)\n *\}", source, re.DOTALL)[1], re.MULTILINE)
     constants = re.findall(r"^uint8 KIND_(\w+)=(\d+)$", sections("msg/Feature.msg")[0], re.MULTILINE)
     assert constants == [("UNKNOWN", "0")] + [(kind.upper(), str(i + 1)) for i, kind in enumerate(kinds)]
 
