@@ -4,7 +4,10 @@
 //! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
 //! be a strip of something round: then whatever explains more of the surface is taken.
 
+use nalgebra::{Point3, Vector3};
+
 use super::facets::{Facets, NONE};
+use super::fit::Surface;
 use super::flats::{FlatPiece, Flats, SMOOTH};
 use super::marks::sort;
 use super::primitive::{NormalSpread, Primitive, cylinder_of, plane_of, refined};
@@ -441,26 +444,28 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
         // most are planes: no more is loaded and reckoned than they need
         Primitive::Plane(plane) => {
             let (point, normal) = (plane.point(), plane.normal());
-            let off = |&vertex: &VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
-            if facets.mesh.corners(FaceId(face)).iter().any(|vertex| off(vertex) > tolerance) {
-                return false;
-            }
-            normal
+            let off = |vertex: VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
+            facets.mesh.corners(FaceId(face)).into_iter().all(|vertex| off(vertex) <= tolerance).then_some(normal)
         }
-        curved => {
-            if facets.triangle(face).iter().any(|p| curved.distance(p).abs() > tolerance) {
-                return false;
-            }
-            curved.distance_and_normal(&facets.mesh.barycentre(FaceId(face))).1
-        }
+        Primitive::Cylinder(cylinder) => normal_beneath(facets, face, cylinder, tolerance),
+        Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
     };
-    if facets.normal(face).dot(&normal) > ALIKE {
-        return true;
-    }
-    let corners = facets.triangle(face);
-    // the normal of a sliver says nothing
-    let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
-    2.0 * facets.area(face) < tolerance * longest
+    normal.is_some_and(|normal| {
+        facets.normal(face).dot(&normal) > ALIKE || {
+            // the normal of a sliver says nothing
+            let corners = facets.triangle(face);
+            let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+            2.0 * facets.area(face) < tolerance * longest
+        }
+    })
+}
+
+/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther from it than `tolerance`, m.
+fn normal_beneath(facets: &Facets, face: u32, surface: &impl Surface, tolerance: f64) -> Option<Vector3<f64>> {
+    let own = surface.to_own();
+    let is_near = |p: &Point3<f64>| surface.distance_at(&own(p)).value.abs() <= tolerance;
+    let middle = || surface.distance_at(&own(&facets.mesh.barycentre(FaceId(face)))).normal;
+    facets.triangle(face).iter().all(is_near).then(|| surface.pose_of().rotation * middle())
 }
 
 /// The largest power of two, as its exponent, that is not above `x`, from 1 on.

@@ -1,7 +1,7 @@
 //! The surfaces that machined parts are made of, and how each is found from faces: by their normals first, then by least
 //! squares over their corners.
 
-use nalgebra::{Matrix2, Matrix3, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
 use super::facets::Facets;
 use super::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, Surface};
@@ -33,7 +33,11 @@ impl Primitive {
     /// Signed distance of `p`, m: positive in the air.
     #[inline]
     pub fn distance(&self, p: &Point3<f64>) -> f64 {
-        self.distance_and_normal(p).0
+        match self {
+            Self::Plane(plane) => plane.distance(p),
+            Self::Cylinder(cylinder) => cylinder.distance(p),
+            Self::Cone(cone) => cone.distance(p),
+        }
     }
 
     /// The plane, if it is one.
@@ -171,45 +175,50 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
         _ if faces.is_empty() => None,
         Primitive::Plane(_) => Some(*primitive),
         Primitive::Cylinder(cylinder) => {
-            moved_to(cylinder, facets, faces, |cylinder| cylinder.radius, true).map(Primitive::Cylinder)
+            moved_to::<_, 5>(cylinder, facets, faces, |cylinder| cylinder.radius, true).map(Primitive::Cylinder)
         }
         Primitive::Cone(cone) => {
-            let cone = moved_to(cone, facets, faces, |cone| cone.radius, false);
+            let cone = moved_to::<_, 6>(cone, facets, faces, |cone| cone.radius, false);
             cone.filter(|cone| cone.half_angle > 0.0).map(Primitive::Cone)
         }
     }
 }
 
+/// By least squares over the N freedoms that the surface has.
+///
 /// - `are_square`: whether the normals of the surface are square to its axis; then those of the faces count.
-fn moved_to<S: Surface>(
+fn moved_to<S: Surface, const N: usize>(
     start: &S,
     facets: &Facets,
     faces: &[u32],
     radius: fn(&S) -> f64,
     are_square: bool,
 ) -> Option<S> {
+    let free = const { numbers_of_free::<N>(S::FREE) };
     // it turns about the middle of the faces
-    let place = |&face: &u32| start.pose_of().inverse_transform_point(&facets.triangle(face)[0]).coords;
-    let mut surface = start.described_from(&faces.iter().map(place).collect::<Vec<_>>());
+    let own = start.to_own();
+    let places: Vec<_> = faces.iter().map(|&face| own(&facets.triangle(face)[0])).collect();
+    let mut surface = start.described_from(&places);
     for _ in 0..ROUNDS {
-        let mut equations = NormalEquations::<FREEDOMS>::default();
+        let mut equations = NormalEquations::<N>::default();
+        let (own, turn) = (surface.to_own(), surface.pose_of().rotation);
         for (at, &face) in faces.iter().step_by(faces.len().div_ceil(MOST_ROWS)).enumerate() {
             let corners = facets.triangle(face);
             let is_one = are_square && faces.len() >= FEW;
             for corner in if is_one { &corners[at % 3..=at % 3] } else { &corners[..] } {
-                let (distance, by) = surface.derivatives(corner);
-                equations.add(&by, -distance, 1.0);
+                let (distance, by) = surface.derivatives_at(&own(corner));
+                equations.add(&SVector::from_fn(|i, _| by[free[i]]), -distance, 1.0);
             }
             if are_square {
-                let normal = surface.pose_of().inverse_transform_vector(&facets.normal(face));
+                let normal = turn.inverse_transform_vector(&facets.normal(face));
                 let [x, y, z] = (normal * (NORMAL_ARM * radius(&surface))).into();
                 let by = Steps::ith(Freedom::TiltX as usize, x) + Steps::ith(Freedom::TiltY as usize, y);
-                equations.add(&by, -z, 1.0);
+                equations.add(&SVector::from_fn(|i, _| by[free[i]]), -z, 1.0);
             }
         }
-        // a freedom that it has not stays
-        (0..FREEDOMS).filter(|&i| !S::FREE[i]).for_each(|i| equations.information[(i, i)] = 1.0);
-        let step = equations.solution()?;
+        let solution = equations.solution()?;
+        let mut step = Steps::zeros();
+        (0..N).for_each(|i| step[free[i]] = solution[i]);
         surface = surface.moved(&step);
         surface.check().ok()?;
         if step.norm() < REST * radius(&surface) {
@@ -217,4 +226,18 @@ fn moved_to<S: Surface>(
         }
     }
     Some(surface)
+}
+
+/// Which of the freedoms a surface has, by their numbers.
+const fn numbers_of_free<const N: usize>(has: [bool; FREEDOMS]) -> [usize; N] {
+    let (mut numbers, mut count, mut freedom) = ([0; N], 0, 0);
+    while freedom < FREEDOMS {
+        if has[freedom] {
+            numbers[count] = freedom;
+            count += 1;
+        }
+        freedom += 1;
+    }
+    assert!(count == N, "the freedoms are counted wrongly");
+    numbers
 }

@@ -100,25 +100,27 @@ pub(crate) enum SearchEnd {
 impl DampedSearch {
     /// From a place with its cost to the least one near it.
     ///
-    /// - `equations`: of a step from a place, with so much damping.
+    /// - `equations`: of a step from a place, undamped.
+    /// - `damped`: the same with so much damping.
     /// - `better`: the place after a step and its cost, where that helps against the cost before.
     /// - `is_last`: whether a step that was made is the last.
     pub fn run<T, const N: usize>(
         &self,
         (mut place, mut cost): (T, f64),
-        equations: impl Fn(&T, f64) -> NormalEquations<N>,
+        equations: impl Fn(&T) -> NormalEquations<N>,
+        damped: impl Fn(NormalEquations<N>, f64) -> NormalEquations<N>,
         better: impl Fn(&T, &SVector<f64, N>, f64) -> Option<(T, f64)>,
         is_last: impl Fn(&SVector<f64, N>, &NormalEquations<N>) -> bool,
     ) -> (T, f64, SearchEnd) {
-        let mut damping = self.first;
+        let (mut damping, mut here) = (self.first, equations(&place));
         for _ in 0..self.tries {
-            let equations = equations(&place, damping);
-            let Some(step) = equations.solution() else { return (place, cost, SearchEnd::Singular) };
+            let Some(step) = damped(here, damping).solution() else { return (place, cost, SearchEnd::Singular) };
             let factor = if let Some(next) = better(&place, &step, cost) {
                 (place, cost) = next;
-                if is_last(&step, &equations) {
+                if is_last(&step, &here) {
                     return (place, cost, SearchEnd::Converged);
                 }
+                here = equations(&place);
                 self.factors[0]
             } else {
                 self.factors[1]
@@ -171,7 +173,8 @@ mod tests {
         let start = Vector2::new(-1.2, 1.0);
         let (end, left, why) = search.run(
             (start, cost(&start)),
-            |p, damping| NormalEquations::of(rows(p).into_iter().zip(residuals(p).map(|r| -r))).damped(damping),
+            |p| NormalEquations::of(rows(p).into_iter().zip(residuals(p).map(|r| -r))),
+            NormalEquations::damped,
             |p, step, before| Some((p + step, cost(&(p + step)))).filter(|(_, after)| *after <= before),
             |step, _| step.norm() < 1e-12,
         );

@@ -54,6 +54,7 @@ impl Surface for Cone {
         &self.pose_of
     }
 
+    #[inline]
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
         let (rho, away) = radial(q);
         let (sin, cos) = self.half_angle.sin_cos();

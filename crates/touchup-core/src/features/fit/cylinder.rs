@@ -40,6 +40,7 @@ impl Surface for Cylinder {
         &self.pose_of
     }
 
+    #[inline]
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
         let (rho, away) = radial(q);
         let s = side(self.concave);

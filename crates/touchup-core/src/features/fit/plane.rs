@@ -52,6 +52,7 @@ impl Surface for Plane {
         &self.pose_of
     }
 
+    #[inline]
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
         Distance { value: q.z, normal: Vector3::z(), by_size: [0.0; 2] }
     }

@@ -78,8 +78,9 @@ impl<'a> FitProblem<'a> {
     pub fn equations<M: Surface>(&self, surface: &M, weights: &[f64]) -> NormalEquations<FREEDOMS> {
         let units = self.units::<M>();
         let mut sum = self.prior(surface);
+        let own = surface.to_own();
         for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            let (distance, by) = surface.derivatives(&self.observations[i].point);
+            let (distance, by) = surface.derivatives_at(&own(&self.observations[i].point));
             let residual = distance - self.observations[i].offset - self.shift[i];
             sum.add(&by.component_mul(&units), residual, w);
         }
@@ -113,8 +114,8 @@ impl<'a> FitProblem<'a> {
     fn search<M: Surface>(&self, search: &DampedSearch, surface: M, weights: &[f64], last: f64) -> (M, SearchEnd) {
         let units = self.units::<M>();
         let start = self.cost(&surface, weights);
-        let equations = |surface: &M, damping: f64| {
-            let equations = self.equations(surface, weights);
+        let equations = |surface: &M| self.equations(surface, weights);
+        let damped = |equations: NormalEquations<FREEDOMS>, damping: f64| {
             let ridge = RIDGE * equations.information.diagonal().max().max(f64::MIN_POSITIVE);
             let mut damped = equations.damped(damping);
             damped.information += FreedomMatrix::identity() * ridge;
@@ -127,7 +128,7 @@ impl<'a> FitProblem<'a> {
         };
         // in standard deviations, squared
         let is_last = |step: &Steps, equations: &NormalEquations<FREEDOMS>| step.dot(&equations.right) < last * last;
-        let (surface, _, end) = search.run((surface, start), equations, better, is_last);
+        let (surface, _, end) = search.run((surface, start), equations, damped, better, is_last);
         (surface, end)
     }
 

@@ -80,6 +80,12 @@ pub trait Surface: Clone {
     /// [`FitError::BadSize`].
     fn check(&self) -> Result<(), FitError>;
 
+    /// Takes points in O to F: made once for many points.
+    fn to_own(&self) -> impl Fn(&Point3<f64>) -> Vector3<f64> + use<Self> {
+        let (center, turn) = (self.center(), self.pose_of().rotation.to_rotation_matrix());
+        move |point| turn.inverse_transform_vector(&(point - center))
+    }
+
     /// Origin of F, m, in O: a point of a plane or of the axis of a cylinder, the centre of the circle of a cone, that of a slot.
     fn center(&self) -> Point3<f64> {
         self.pose_of().translation.vector.into()
@@ -97,23 +103,31 @@ pub trait Surface: Clone {
     }
 
     /// Signed distance of a point in O, m, positive in the air.
+    #[inline]
     fn distance(&self, point: &Point3<f64>) -> f64 {
         self.distance_at(&self.pose_of().inverse_transform_point(point).coords).value
     }
 
     /// Signed distance of a point in O, m, and the unit normal into the air at the nearest place, in O.
+    #[inline]
     fn distance_and_normal(&self, point: &Point3<f64>) -> (f64, Vector3<f64>) {
         let Distance { value, normal, .. } = self.distance_at(&self.pose_of().inverse_transform_point(point).coords);
         (value, self.pose_of().rotation * normal)
     }
 
     /// Signed distance of a point in O and its derivatives by each freedom; 0 for those it has not.
+    #[inline]
+    fn derivatives(&self, point: &Point3<f64>) -> (f64, Steps) {
+        self.derivatives_at(&self.pose_of().inverse_transform_point(point).coords)
+    }
+
+    /// [`Self::derivatives`] at a point given in F.
     ///
     /// Shifting F by t and turning it by ω (both in F) takes a fixed point from q to q − t − ω × q, so with the normal n
     /// the derivatives are −n by t and −q × n by ω; a tilt towards x is ω = (0, 1, 0), towards y (−1, 0, 0).
-    fn derivatives(&self, point: &Point3<f64>) -> (f64, Steps) {
-        let q = self.pose_of().inverse_transform_point(point).coords;
-        let Distance { value, normal: n, by_size } = self.distance_at(&q);
+    #[inline]
+    fn derivatives_at(&self, q: &Vector3<f64>) -> (f64, Steps) {
+        let Distance { value, normal: n, by_size } = self.distance_at(q);
         let turn = -q.cross(&n);
         let all = [-n.x, -n.y, -n.z, turn.y, -turn.x, turn.z, by_size[0], by_size[1]];
         (value, Steps::from_fn(|i, _| if Self::FREE[i] { all[i] } else { 0.0 }))
@@ -133,12 +147,14 @@ pub trait Surface: Clone {
 }
 
 /// Distance of a point from the z axis and the unit vector away from it; x on the axis itself, where every one will do.
+#[inline]
 pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let rho = q.xy().norm();
     (rho, if rho > 0.0 { Vector3::new(q.x / rho, q.y / rho, 0.0) } else { Vector3::x() })
 }
 
 /// +1 where the material is inside (a boss), −1 where the air is (a hole).
+#[inline]
 pub(super) fn side(concave: bool) -> f64 {
     if concave { -1.0 } else { 1.0 }
 }

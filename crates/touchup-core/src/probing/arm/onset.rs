@@ -335,17 +335,18 @@ impl ForceCurve<'_> {
     /// The line of least cost near another, and its cost.
     fn fit(&self, line: LineFit) -> Option<(LineFit, f64)> {
         let believed = self.params.delay_sigma.powi(-2);
-        let equations = |line: &LineFit, damping: f64| {
+        let equations = |line: &LineFit| {
             let mut equations = self.normal_equations(line, self.noise);
             equations.add(&LineFit::ith(TAU, 1.0), self.params.delay - line[TAU], believed);
-            equations.damped(damping)
+            equations
         };
         let better = |line: &LineFit, step: &LineFit, before: f64| {
             let next = line + step;
             Some((next, self.cost(&next))).filter(|(next, cost)| *cost <= before && next[K] > 0.0)
         };
         let is_last = |step: &LineFit, _: &NormalEquations<4>| step[S0].abs() < REST && step[TAU].abs() < REST;
-        let (line, cost, end) = SEARCH.run((line, self.cost(&line)), equations, better, is_last);
+        let (line, cost, end) =
+            SEARCH.run((line, self.cost(&line)), equations, NormalEquations::damped, better, is_last);
         (end != SearchEnd::Singular && line.iter().all(|x| x.is_finite())).then_some((line, cost))
     }
 

@@ -59,9 +59,13 @@ impl SlotFit {
         let scale = points.iter().map(|p| (p - self.middle).norm()).fold(1e-6, f64::max);
         // in units of the size, an angle is as large as a length
         let units = Vector5::new(scale, scale, 1.0, scale, scale);
-        let equations = |slot: &Self, damping: f64| {
+        let damped = |mut equations: NormalEquations<5>, damping: f64| {
+            equations.information += Matrix5::identity() * damping;
+            equations
+        };
+        let equations = |slot: &Self| {
             let mut equations =
-                NormalEquations { information: Matrix5::identity() * (HELD + damping), ..NormalEquations::default() };
+                NormalEquations { information: Matrix5::identity() * HELD, ..NormalEquations::default() };
             for p in points {
                 let (r, by) = slot.residual(p);
                 equations.add(&(by.component_mul(&units) / scale), -(r / scale), 1.0);
@@ -78,7 +82,7 @@ impl SlotFit {
             };
             Some((next, next.rms(points))).filter(|(_, rms)| *rms < before)
         };
-        SEARCH.run((self, self.rms(points)), equations, better, |_, _| false).0
+        SEARCH.run((self, self.rms(points)), equations, damped, better, |_, _| false).0
     }
 
     /// The best one through points around a place, in any direction, among those with the free places inside.
