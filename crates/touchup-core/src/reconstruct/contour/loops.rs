@@ -14,6 +14,7 @@ pub(in crate::reconstruct) type Segments = [Option<[u8; 2]>; 2];
 
 /// The segments on a square from the signs at its corners (true: material). Where all four edges are crossed,
 /// `is_joined`: whether the material in the two opposite corners is connected.
+#[inline]
 pub(in crate::reconstruct) fn segments(is_material: [bool; 4], is_joined: impl FnOnce() -> bool) -> Segments {
     let leaves = |i: usize| is_material[i] && !is_material[(i + 1) % 4];
     let enters = |i: usize| !is_material[i] && is_material[(i + 1) % 4];

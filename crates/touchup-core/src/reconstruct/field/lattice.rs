@@ -33,11 +33,13 @@ pub(in crate::reconstruct) fn stepped(mut node: LatticeNode, axis: usize, count:
 }
 
 /// Corner `corner` of a cell: bit i says whether it is the upper one along axis i.
+#[inline]
 pub(in crate::reconstruct) fn node_at(cell: LatticeNode, corner: u8) -> LatticeNode {
     std::array::from_fn(|i| cell[i].saturating_add(i32::from(corner >> i & 1)))
 }
 
 /// The cell that has `node` as its corner `corner`.
+#[inline]
 pub(in crate::reconstruct) fn cell_at(node: LatticeNode, corner: u8) -> LatticeNode {
     std::array::from_fn(|i| node[i].saturating_sub(i32::from(corner >> i & 1)))
 }
@@ -262,11 +264,13 @@ pub struct Edge {
 
 impl Edge {
     /// The four cells around it, counter-clockwise seen against `axis`.
+    #[inline]
     pub fn cells(&self) -> [LatticeNode; 4] {
         ring(self.node, self.axis, -1)
     }
 
     /// The four squares that end at it: number i is between cells i and i + 1 of [`Self::cells`].
+    #[inline]
     pub fn squares(&self) -> [Square; 4] {
         ring_sides(self.node, self.axis, -1).map(|(node, axis)| Square { node, axis })
     }
@@ -296,16 +300,19 @@ pub struct Square {
 
 impl Square {
     /// Its corners, counter-clockwise seen against `axis`.
+    #[inline]
     pub fn corners(&self) -> [LatticeNode; 4] {
         ring(self.node, self.axis, 1)
     }
 
     /// Its edges: number i joins corners i and i + 1 of [`Self::corners`].
+    #[inline]
     pub fn edges(&self) -> [Edge; 4] {
         ring_sides(self.node, self.axis, 1).map(|(node, axis)| Edge { node, axis })
     }
 
     /// The cell below it and the one above, along `axis`.
+    #[inline]
     pub fn cells(&self) -> [LatticeNode; 2] {
         [stepped(self.node, self.axis as usize, -1), self.node]
     }
