@@ -49,11 +49,11 @@ python_environment() {
   local wanted; wanted=$(cat tests/python/requirements.txt "$requirements" | cksum)
   [ "$(cat "$venv.made" 2>/dev/null)" = "$wanted" ] && return 0
   rm -rf "$venv" "$venv.made"
-  {
-    python3 -m venv "$venv" && "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$requirements"
-  } > "$logs/pip.log" 2>&1 || { tail -n 5 "$logs/pip.log" >&2; return 1; }
+  python3 -m venv "$venv" && "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$requirements" || return 1
   echo "$wanted" > "$venv.made"
 }
+
+python_is_ready() { wait "$1" || { tail -n 5 "$logs/pip.log" >&2; return 1; }; }
 
 # a UR arm needs a Python to link with, its shared library and what finds that; the tests install ur-rtde by themselves
 ur_feature() {
@@ -82,9 +82,10 @@ failed_tests() {
 unoptimised=(--config profile.dev.package.touchup.opt-level=0)
 for crate in crates/*; do unoptimised+=(--config "profile.dev.package.$(basename "$crate").opt-level=0"); done
 
-# the program, the stand-in for a controller and what tests them
+# what tests, then the program and the stand-in for a controller, which by then are all but built: the other way round one core
+# waits for the last crates of the program
 build_tests() {
-  cargo build "${ur[@]}" --bins --examples && cargo test --workspace --no-run "${ur[@]}" "${programs[@]}" || fail "the tests do not build"
+  cargo test --workspace --no-run "${ur[@]}" "${programs[@]}" && cargo build "${ur[@]}" --bins --examples || fail "the tests do not build"
 }
 
 # cargo_tests LOG ARGUMENT...
@@ -111,7 +112,8 @@ python_tests() {
     export TOUCHUP_UR_BIN=$target/debug/touchup TOUCHUP_UR_CONTROLLER=$target/debug/examples/ur_controller
   fi
   local status summary line passed_here
-  "$venv/bin/python" -m pytest tests/python -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --durations=20 \
+  # two at a time, each file on one of them: many tests wait for a node, and each has a domain of its own
+  "$venv/bin/python" -m pytest tests/python --numprocesses 2 --dist loadfile -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --durations=20 \
     --junitxml="$logs/python.xml" 2>&1 | tee "$logs/python.log"
   status=${PIPESTATUS[0]}
   summary=$(counted_by_pytest "$logs/python.xml") || { fail "pytest ended with $status, see $logs/python.log"; return; }
@@ -139,6 +141,9 @@ print(passed, *others, sep="\n")
 PYTHON
 }
 
+# they arrive while the tests are built
+python_environment > "$logs/pip.log" 2>&1 &
+packages=$!
 ur_feature || skip "$(cat tests/ur/*.rs | grep -c '^#\[test\]')" "a UR arm needs the shared library of Python (Debian: apt-get install python3-dev)"
 programs=(--test rooms --test report)
 [ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
@@ -149,7 +154,7 @@ stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptim
 stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
-elif stage "Python packages" python_environment && [ -e "$venv.made" ]; then
+elif stage "Python packages" python_is_ready "$packages" && [ -e "$venv.made" ]; then
   stage "Python tests" python_tests
 else
   count=$(cat tests/python/test_*.py | grep -c '^ *def test_')

@@ -40,7 +40,9 @@ while IFS='|' read -r test heading; do
   printf '\n## %s\n\n`%s`\n\n```text\n%s\n```\n' "$heading" "$test" "$text"
 done <<'PROOFS'
 features::touched::touched_features_are_found_within_their_stated_uncertainty|Features of the touched plate, fifty seeds
-reconstruct::accuracy::other_tips_hands_and_friction|Other tips, hands and friction, twenty seeds
+reconstruct::accuracy::other_tips_balls_hands_and_friction|Other balls, hands and friction, twenty seeds
+reconstruct::accuracy::other_tips_flat_ends|Flat ends, twenty seeds
+reconstruct::accuracy::other_tips_a_cone|A cone, twenty seeds
 reconstruct::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them|Stated uncertainty where errors are as the model has them
 reconstruct::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty|Stated uncertainty where errors are others
 reconstruct::tips::contacts_of_a_tip_are_located|Where a tip touched

@@ -1,5 +1,8 @@
 //! The demo plate scanned and touched: the samples that a program gets.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
@@ -38,11 +41,16 @@ pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> V
     samples.iter().map(|sample| *estimator.observe(sample).unwrap()).collect()
 }
 
+/// The plate as the scanner of the demo sees it; of each seed it is made once.
+pub fn plate_scan(seed: u64) -> TriMesh {
+    static SCANS: Mutex<BTreeMap<u64, TriMesh>> = Mutex::new(BTreeMap::new());
+    let scanned = || scan(&Plate::default(), &ScannerParams { seed, ..ScannerParams::default() }).unwrap();
+    SCANS.lock().unwrap().entry(seed).or_insert_with(scanned).clone()
+}
+
 /// With the simulator's ground truth.
 pub fn plate_stream(stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
     let plate = Plate::default();
-    let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let scan = scan(&plate, &scanner).unwrap();
     let touch = touch(&plate, &path(stylus), stylus, seed).unwrap();
     let mut samples = Vec::new();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
@@ -52,5 +60,5 @@ pub fn plate_stream(stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
     }
     sync.finish();
     samples.extend(std::iter::from_fn(|| sync.next_sample()));
-    (PlateStream { scan, noise: scanner.noise, samples }, touch)
+    (PlateStream { scan: plate_scan(seed), noise: ScannerParams::default().noise, samples }, touch)
 }

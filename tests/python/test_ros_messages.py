@@ -144,11 +144,12 @@ def test_lengths_angles_and_forces_are_si():
 
 def test_a_feature_mirrors_the_file_of_features():
     source = (ROOT / "crates/touchup-io/src/features_file.rs").read_text()
-    record = re.search(r"pub struct FeatureRecord \{(.*?)\n\}", source, re.DOTALL)[1]
-    in_file = {re.sub(r"_(mm|deg)$", "", name) for name in re.findall(r"^    pub (\w+):", record, re.MULTILINE)}
+    record = re.search(r"pub struct FeatureRecord, .*?\{(.*?)\n    \}", source, re.DOTALL)[1]
+    in_file = {re.sub(r"_(mm|deg)$", "", name) for name in re.findall(r"^        pub (\w+)\??:", record, re.MULTILINE)}
     mine = {name for _, name, _ in fields(sections("msg/Feature.msg")[0])}
     # one std and one list of touches by name there, a field for each number and their count here
-    stds = set(re.findall(r"note\(\"(\w+?)_(?:mm|deg)\"", source)) | set(re.findall(r"number\(\"(\w+?)_(?:mm|deg)\"", source))
+    known = re.search(r"fn known\(.*?\n\}", source, re.DOTALL)[0]
+    stds = set(re.findall(r"\"(\w+?)_(?:mm|deg)\"", known))
     assert {name.removesuffix("_std") for name in mine if name.endswith("_std")} == stds
     # only a live session has flags
     only_live = {"status", "search_radius", "touch_count"}

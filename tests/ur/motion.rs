@@ -67,10 +67,9 @@ fn a_slide_goes_over_a_rim() {
         let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.zero()?;
-        let mut reached = None;
-        let record = watched.slide(&target, &TouchParams::default(), &mut reached)?;
+        let record = watched.slide(&target, &TouchParams::default())?;
         println!("mean {:.2} N, {:.2} N off at most", record.mean_force, record.worst_force);
-        assert_eq!((record.ending, record.reached, reached), (SlideEnding::Arrived, last, Some(last)));
+        assert_eq!((record.ending, record.reached, watched.reached), (SlideEnding::Arrived, last, Some(last)));
         assert!((record.mean_force - 3.0).abs() < 0.1 && record.worst_force < 0.3, "{record:?}");
         Ok(())
     });

@@ -17,10 +17,11 @@ use touchup::ros::messages::{
 };
 use touchup::ros::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply};
-use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, scan};
+use touchup::ros::port::{ArmOrder, Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply};
+use touchup::sim::{ArmParams, Plate, SimArm};
 
 use super::samples::bench::join;
+use crate::plate_stream::plate_scan;
 
 /// Nothing takes so long: what has not come by then hangs.
 const HUNG: Duration = Duration::from_secs(120);
@@ -43,10 +44,9 @@ impl Cell {
     }
 
     fn with(may_move: bool, kind: impl FnOnce(&Clock) -> ArmKind) -> Self {
-        let (folder, plate) = (tempfile::tempdir().unwrap(), Plate::default());
+        let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        let scanned = scan(&plate, &ScannerParams::default()).unwrap();
-        write_mesh(&path("scan.ply"), &scanned, MeshUnit::Millimetre).unwrap();
+        write_mesh(&path("scan.ply"), &plate_scan(1), MeshUnit::Millimetre).unwrap();
         std::fs::write(path("scene.yaml"), include_str!("../../../config/probe.yaml")).unwrap();
         let mut parameters = Parameters::default();
         let text = |value: &std::path::Path| ParameterValue::String(value.to_str().unwrap().to_owned());
@@ -95,7 +95,7 @@ impl Cell {
 
     fn probe(&self, id: u32, settings: ProbeSettings) -> ProbeResult {
         let request = ProbeFeatureRequest { id, settings };
-        self.world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap().result
+        self.world.call(|reply| Call::Arm(ArmOrder::Feature(request, reply))).recv().unwrap().result
     }
 
     /// Sends a goal, and does something at its third touch, while the arm waits for that; how it ended.
@@ -119,7 +119,7 @@ impl Cell {
             is_cancelled: cancelled,
         };
         let asked = ProbeGoal { ids: ids.to_vec(), settings: ProbeSettings::default() };
-        assert!(self.world.arrive_patiently(Arrival::Call(Call::Probe(asked, goal))));
+        assert!(self.world.arrive_patiently(Arrival::Call(Call::Arm(ArmOrder::Goal(asked, goal)))));
         result.recv_timeout(HUNG).unwrap()
     }
 
@@ -161,7 +161,7 @@ fn a_flagged_hole_is_probed_and_shown() {
     let off = (hole.center.x - 16e-3).hypot(hole.center.y - 36e-3);
     let (end, published) = cell.end();
     let touches = published.iter().filter_map(|publication| match publication {
-        Publication::ProbeTouch(touch) => Some(&**touch),
+        Publication::ProbeTouch(touch) => Some(touch),
         _ => None,
     });
     let touches: Vec<_> = touches.collect();
@@ -211,7 +211,7 @@ fn a_cancelled_goal_stops_and_retracts_and_the_node_goes_on() {
     let (world, (to, busy)) = (cell.world.clone(), sync_channel(1));
     let (end, response) = cell.goal(&ids, move |cancel| {
         let request = ProbeFeatureRequest { id: ids[1], settings: ProbeSettings::default() };
-        to.send(world.call(|reply| Call::ProbeFeature(request, reply)).recv().unwrap().result).unwrap();
+        to.send(world.call(|reply| Call::Arm(ArmOrder::Feature(request, reply))).recv().unwrap().result).unwrap();
         cancel.store(true, Ordering::Release);
     });
     let busy = busy.recv().unwrap();
@@ -245,9 +245,9 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
         let result = cell.probe(id, bad);
         assert_eq!(result.code, ProbeResult::BAD_REQUEST, "{bad:?}: {}", result.message);
     }
-    let all = cell.world.call(Call::ProbeAll).recv().unwrap();
+    let all = cell.world.call(|reply| Call::Arm(ArmOrder::All(reply))).recv().unwrap();
     assert!(!all.success && all.message.contains("allow_motion"), "{}", all.message);
-    assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+    assert!(cell.world.call(|reply| Call::Arm(ArmOrder::Recover(reply))).recv().unwrap().success);
     let numbers =
         |text: &str| -> Vec<f64> { text.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect() };
     let (before, after) = (numbers(&at), numbers(&cell.state().1));
@@ -280,7 +280,7 @@ fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
         assert!(response.message.contains(why), "{}", response.message);
         assert!(cell.height() > 14.0, "it retracted: {}", cell.state().1);
         assert_eq!(cell.probe(id, ProbeSettings::default()).code, code);
-        let all = cell.world.call(Call::ProbeAll).recv().unwrap();
+        let all = cell.world.call(|reply| Call::Arm(ArmOrder::All(reply))).recv().unwrap();
         assert!(!all.success, "{}", all.message);
         pause(&cell.world, false);
         allow(&cell.world, true);
@@ -309,7 +309,7 @@ fn a_stop_stands_until_it_is_recovered() {
         let (can_move, why) = cell.state();
         assert!(!can_move && why.contains("~/recover"), "{why}");
         assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
-        assert!(cell.world.call(Call::Recover).recv().unwrap().success);
+        assert!(cell.world.call(|reply| Call::Arm(ArmOrder::Recover(reply))).recv().unwrap().success);
         say(Safety::Normal);
         let (can_move, why) = cell.state();
         assert!(can_move, "{why}");

@@ -41,7 +41,7 @@ fn plan<M: Surface>(
     let mut chosen = Vec::new();
     while chosen.len() < count
         && known.worst(asked) > 1.0
-        && let Some(best) = known.best(surface, candidates, asked)
+        && let Some((best, _)) = known.best(surface, 0..candidates.len(), |&at| candidates[at], asked)
     {
         known = known.with(surface, &candidates[best]);
         chosen.push(best);

@@ -11,14 +11,13 @@ use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{
     CalibrationParams, Patched, Patcher, PatcherParams, Support, TouchFinder, TouchFinderParams,
 };
-use touchup::sim::{
-    PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, scan, touch,
-};
+use touchup::sim::{PathParams, Plate, ScannerParams, SensorParams, StylusParams, Surface, Touch, plan_demo, touch};
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, Message, ProbedPoint, Sample, SyncParams, Synchroniser, TipParams, Wrench,
 };
 
 use crate::full::either;
+use crate::plate_stream::plate_scan;
 
 fn normal(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
@@ -27,8 +26,8 @@ fn normal(rng: &mut Pcg64) -> f64 {
 /// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `stated` give or take what the
 /// calibration leaves.
 fn touched_plate(stated: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherParams) {
-    let scanner = ScannerParams { seed, ..ScannerParams::default() };
-    let params = PatcherParams::new(stated.radius, Some(stated.stiffness), scanner.noise);
+    let scan_noise = ScannerParams::default().noise;
+    let params = PatcherParams::new(stated.radius, Some(stated.stiffness), scan_noise);
     let calibration = params.uncertainty.unwrap().calibration;
     let mut rng = Pcg64::seed_from_u64(seed);
     let stylus = StylusParams {
@@ -37,9 +36,8 @@ fn touched_plate(stated: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherPa
         ..*stated
     };
     let (plate, hand) = (Plate::default(), PathParams { radius: stylus.radius, ..PathParams::default() });
-    let scan = scan(&plate, &scanner).unwrap();
     let touch = touch(&plate, &plan_demo(&plate, &hand).unwrap(), &stylus, seed).unwrap();
-    (scan, touch, params)
+    (plate_scan(seed), touch, params)
 }
 
 fn estimator(radius: f64, stiffness: Option<f64>) -> ContactEstimator {
@@ -169,15 +167,14 @@ fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> 
 /// Touched vertices of a plate whose stated parameters and noise differ from those of the model: normalised errors, errors in
 /// m, and standard deviations.
 fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<f64>, Vec<f64>) {
-    let scanner = ScannerParams { seed, ..ScannerParams::default() };
     let own = if matches!(noise, Foreign::Nothing) { SensorParams::default().pose_noise } else { 0.0 };
     let stylus =
         StylusParams { sensor: SensorParams { pose_noise: own, ..SensorParams::default() }, ..StylusParams::default() };
     let plate = Plate::default();
-    let scan = scan(&plate, &scanner).unwrap();
     let touch = touch(&plate, &plan_demo(&plate, &PathParams::default()).unwrap(), &stylus, seed).unwrap();
-    let params = PatcherParams::new(stylus.radius * stated[0], Some(stylus.stiffness * stated[1]), scanner.noise);
-    let made = patched(&mut patcher_of(&disturbed(&touch.messages, noise, seed), params), &scan);
+    let scan_noise = ScannerParams::default().noise;
+    let params = PatcherParams::new(stylus.radius * stated[0], Some(stylus.stiffness * stated[1]), scan_noise);
+    let made = patched(&mut patcher_of(&disturbed(&touch.messages, noise, seed), params), &plate_scan(seed));
     let mut normalised = Normalised::default();
     normalised.add(&made, &plate, Support::Touched);
     let touched =

@@ -8,7 +8,7 @@ use touchup::mesh::{FaceId, TriMesh};
 use touchup::sim::Peaks;
 use touchup::sim::coupled::GuidedStylus;
 use touchup::stylus::{Sample, Wrench};
-use touchup_report::{BLOWN_UP, MeshErrors, PaperSweeps, RobustSweeps, noisy, raster_samples};
+use touchup_report::convergence::{BLOWN_UP, MeshErrors, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 mod qualities;
 

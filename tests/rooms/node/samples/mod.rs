@@ -19,7 +19,7 @@ use touchup::ros::messages::{
     UnflagFeatureRequest,
 };
 use touchup::ros::parameters::ParameterValue;
-use touchup::ros::port::{Arrival, Call, Publication};
+use touchup::ros::port::{ArmOrder, Arrival, Call, Publication};
 use touchup::stylus::{Message, StampedPose};
 
 /// What was taken is on the disk after so long.
@@ -55,7 +55,7 @@ fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
 
 #[test]
 fn the_result_is_that_of_refine_byte_for_byte_however_messages_interleave() {
-    let plate = Plate::touched(0.3);
+    let plate = Plate::touched(0.15);
     let expected = plate.refined("touch.mcap");
     for seed in 0..3 {
         let messages = if seed == 0 { plate.messages.clone() } else { interleaved(&plate.messages, seed) };
@@ -487,7 +487,7 @@ fn without_an_arm_probing_says_so() {
     let plate = Plate::touched(0.001);
     let bench = Bench::start(&plate);
     let request = ProbeFeatureRequest { id: 3, ..ProbeFeatureRequest::default() };
-    let answer = bench.call(|reply| Call::ProbeFeature(request, reply));
+    let answer = bench.call(|reply| Call::Arm(ArmOrder::Feature(request, reply)));
     assert_eq!((answer.result.code, answer.result.id), (ProbeResult::NO_ARM, 3));
     assert!(answer.result.message.starts_with("no arm configured"));
     bench.end();

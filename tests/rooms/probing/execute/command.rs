@@ -7,9 +7,10 @@ use std::process::{Command, Output};
 use nalgebra::Point3;
 use serde_json::Value;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
-use touchup::sim::{Plate, ScannerParams, Surface, scan};
+use touchup::sim::{Plate, Surface};
 
 use crate::full::either;
+use crate::plate_stream::plate_scan;
 
 fn touchup(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).output().unwrap()
@@ -22,8 +23,7 @@ fn stderr(done: &Output) -> String {
 /// Scene, scan and part of the demo in a folder.
 fn cell(folder: &Path, change: impl Fn(String) -> String) -> [String; 2] {
     let plate = Plate::default();
-    let scanned = scan(&plate, &ScannerParams::default()).unwrap();
-    write_mesh(&folder.join("scan.ply"), &scanned, MeshUnit::Millimetre).unwrap();
+    write_mesh(&folder.join("scan.ply"), &plate_scan(1), MeshUnit::Millimetre).unwrap();
     write_mesh(&folder.join("truth.ply"), &plate.mesh(1e-5).unwrap(), MeshUnit::Millimetre).unwrap();
     let scene = change(include_str!("../../../../config/probe.yaml").to_owned());
     fs::write(folder.join("scene.yaml"), scene).unwrap();

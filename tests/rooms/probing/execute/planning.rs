@@ -14,9 +14,10 @@ use touchup::probing::execute::{
     Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
 };
 use touchup::probing::plan::PatternParams;
-use touchup::sim::{ArmFault, ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
+use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
 
 use super::{cell, params};
+use crate::plate_stream::plate_scan;
 
 /// A mesh that stays unchanged.
 struct StaticScan {
@@ -74,10 +75,6 @@ impl World for StaticScan {
     }
 }
 
-fn plate_scan() -> TriMesh {
-    scan(&Plate::default(), &ScannerParams::default()).unwrap()
-}
-
 const HOLE: Flag = Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(17e-3, 35e-3, 12e-3), radius: 3e-3 };
 
 fn above(cell: &Cell, place: [f64; 3]) -> Isometry3<f64> {
@@ -97,7 +94,7 @@ fn probed(params: &ProbeParams, world: &mut StaticScan, change: impl FnOnce(&mut
 /// The hole of the plate: Ø 8 mm at (16, 36).
 #[test]
 fn a_flag_becomes_a_feature() {
-    let mut world = StaticScan::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan(1));
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::ToleranceReached);
     let hole = probed.found.as_ref().unwrap().feature.as_ref().unwrap();
@@ -117,7 +114,7 @@ fn a_flag_becomes_a_feature() {
 
 #[test]
 fn exhausted_limits_are_reported() {
-    let of = |params: ProbeParams| probed(&params, &mut StaticScan::new(plate_scan()), |_| {}).0;
+    let of = |params: ProbeParams| probed(&params, &mut StaticScan::new(plate_scan(1)), |_| {}).0;
     let few = PatternParams { budget: 13, sigma: 1e-9, ..PatternParams::default() };
     let spent = of(ProbeParams { pattern: few, ..params() });
     assert_eq!((spent.ending, spent.touches.len()), (Ending::TouchesSpent, 13));
@@ -129,7 +126,7 @@ fn exhausted_limits_are_reported() {
 
 #[test]
 fn a_cancelled_probing_stops_and_retracts() {
-    let mut world = StaticScan { patience: Some(6000), ..StaticScan::new(plate_scan()) };
+    let mut world = StaticScan { patience: Some(6000), ..StaticScan::new(plate_scan(1)) };
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::Cancelled);
     assert!(!probed.touches.is_empty());
@@ -141,7 +138,7 @@ fn a_cancelled_probing_stops_and_retracts() {
 fn a_cancelled_probing_goes_no_deeper() {
     // every segment of its path, also between the places of the retreat
     for patience in (1..16).map(|times| 700 * times).chain((0..8).map(|times| 3000 + 211 * times)) {
-        let mut world = StaticScan { patience: Some(patience), ..StaticScan::new(plate_scan()) };
+        let mut world = StaticScan { patience: Some(patience), ..StaticScan::new(plate_scan(1)) };
         let (probed, _, end) = probed(&params(), &mut world, |_| {});
         assert_eq!(probed.ending, Ending::Cancelled, "{patience}");
         let [first, least] = world.since_then.unwrap();
@@ -178,7 +175,7 @@ fn nothing_is_zeroed_where_the_probe_is_at_the_mesh() {
 fn what_is_out_of_reach_is_refused_before_anything_moves() {
     let mut tight = params();
     tight.limits.lowest.z = 0.07;
-    let mut world = StaticScan::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan(1));
     let (probed, stood, _) = probed(&tight, &mut world, |_| {});
     assert!(matches!(probed.ending, Ending::OutOfLimits(_)), "{}", probed.ending);
     assert!(stood.abs() < 1e-9, "it moved until {stood} s");
@@ -186,7 +183,7 @@ fn what_is_out_of_reach_is_refused_before_anything_moves() {
 
 #[test]
 fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
-    let mut world = StaticScan::new(plate_scan());
+    let mut world = StaticScan::new(plate_scan(1));
     let (probed, stood, _) = probed(&params(), &mut world, |arm| arm.fail_at(20.0, ArmFault::ProtectiveStop));
     let Ending::Stopped(ProbeError::Arm { error, .. }) = &probed.ending else { panic!("{}", probed.ending) };
     assert_eq!(*error, touchup::probing::arm::ArmError::Stopped { safety: Safety::ProtectiveStop });
@@ -198,11 +195,11 @@ fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
 #[test]
 fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     let hit = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::ForceSpike(40.0));
-    let (spiked, ..) = probed(&params(), &mut StaticScan::new(plate_scan()), hit);
+    let (spiked, ..) = probed(&params(), &mut StaticScan::new(plate_scan(1)), hit);
     assert!(matches!(spiked.ending, Ending::Stopped(ProbeError::Limit { .. })), "{}", spiked.ending);
     assert!((spiked.peak_force - 40.0).abs() < 5.0, "{}", spiked.peak_force);
     let lose = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::LinkLost);
-    let (lost, ..) = probed(&params(), &mut StaticScan::new(plate_scan()), lose);
+    let (lost, ..) = probed(&params(), &mut StaticScan::new(plate_scan(1)), lose);
     // the sensor was zeroed in 64 readings before it began
     assert!((lost.seconds - 20.0).abs() < 0.3, "{}", lost.seconds);
 }
@@ -269,7 +266,7 @@ fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     let start = cell.pose(&lean, &Point3::new(30e-3, 25e-3, 16e-3));
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     let mut world = Turning {
-        scan: StaticScan::new(plate_scan()),
+        scan: StaticScan::new(plate_scan(1)),
         plate: plate.clone(),
         cell: cell.clone(),
         before: None,
@@ -348,7 +345,7 @@ fn a_dry_run_moves_nothing() {
     let start = above(&cell, [40e-3, 25e-3, 50e-3]);
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     let now = arm.next_state().unwrap();
-    let world = StaticScan::new(plate_scan());
+    let world = StaticScan::new(plate_scan(1));
     let planned = plan(&cell, &params(), &world, &HOLE, &now).unwrap();
     assert!(!planned.touches.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
     assert_eq!(arm.at_rest_since(), 0.0);

@@ -8,9 +8,10 @@ use touchup::probing::arm::{
 };
 use touchup::probing::execute::{Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan};
 use touchup::probing::plan::{Slide, Station};
-use touchup::sim::{ArmParams, Plate, ScannerParams, SimArm, Surface, scan};
+use touchup::sim::{ArmParams, Plate, SimArm, Surface};
 
 use super::cell;
+use crate::plate_stream::plate_scan;
 
 /// Top of the plate, m.
 const TOP: f64 = 12e-3;
@@ -26,7 +27,7 @@ fn flag(kind: Option<Kind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {
 }
 
 fn world() -> StaticWorld {
-    StaticWorld::new(scan(&Plate::default(), &ScannerParams::default()).unwrap())
+    StaticWorld::new(plate_scan(1))
 }
 
 fn start() -> Isometry3<f64> {
@@ -129,9 +130,8 @@ fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>,
     let limits = self::params().limits;
     let mut watched = Watched::new(&mut arm, limits, &mut onlooker);
     watched.zero().unwrap();
-    let mut reached = None;
-    let record = watched.slide(&target, &TouchParams::default(), &mut reached).unwrap();
-    assert_eq!(reached, Some(record.reached));
+    let record = watched.slide(&target, &TouchParams::default()).unwrap();
+    assert_eq!(watched.reached, Some(record.reached));
     let peak = arm.peak_force();
     arm.advance(0.2);
     (record, arm.ball(), peak)
