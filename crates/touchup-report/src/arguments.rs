@@ -11,11 +11,12 @@ use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
 use touchup_io::recording::Topics;
-use touchup_report::cost::{CostError, cost};
-use touchup_report::{
-    Chapter, Effort, GivenPart, Report, ReportError, TableCell, WholeScanError, WorkPrecision, convergence, extremes,
-    stability, verdict, whole_scan,
-};
+use touchup_report::document::Report;
+use touchup_report::error::MeasureError;
+use touchup_report::files::ReportError;
+use touchup_report::whole_scan::GivenPart;
+use touchup_report::work_precision::WorkPrecision;
+use touchup_report::{Chapter, Effort, TableCell, convergence, cost, extremes, stability, verdict, whole_scan};
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::{Scene, SceneError};
 
@@ -37,9 +38,9 @@ pub enum CommandError {
     #[error(transparent)]
     Peers(#[from] PeersError),
     #[error(transparent)]
-    WholeScan(#[from] WholeScanError),
+    WholeScan(MeasureError),
     #[error(transparent)]
-    Cost(#[from] CostError),
+    Cost(MeasureError),
     #[error(transparent)]
     Report(#[from] ReportError),
 }
@@ -128,22 +129,22 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
         commit: COMMIT.to_owned(),
         command: command(),
         date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
-        advice: None,
-        verdict: Vec::new(),
-        chapters: Vec::new(),
+        ..Report::default()
     };
-    measure(arguments, &mut report, &mut lines_on_stderr())?;
+    arguments.measure(&mut report, &mut lines_on_stderr())?;
     for file in report.files()? {
         let path = out.join(&file.name);
         write_atomically(&path, |to| to.write_all(&file.bytes)).map_err(write_error(&path))?;
     }
-    if *json {
-        print(&serde_json::to_string(&report).map_err(ReportError::from)?);
+    let text = if *json {
+        serde_json::to_string(&report).map_err(ReportError::from)?
     } else {
         let advice = report.advice.iter().flat_map(|table| table.rows.iter().map(|row| advice_line(row)));
         let lines: Vec<String> = advice.chain(report.verdict.iter().cloned()).collect();
-        print(&format!("{}\n\nwrote {}", lines.join("\n\n"), out.join("report.html").display()));
-    }
+        format!("{}\n\nwrote {}", lines.join("\n\n"), out.join("report.html").display())
+    };
+    // a reader that has gone away is no error of ours
+    let _ = writeln!(stdout(), "{text}");
     Ok(())
 }
 
@@ -153,57 +154,52 @@ fn advice_line(row: &[TableCell]) -> String {
     texts.filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
 }
 
-/// Adds every selected chapter, in the order of the page.
-fn measure(
-    arguments: &ReportArguments,
-    report: &mut Report,
-    progress: &mut dyn FnMut(&str),
-) -> Result<(), CommandError> {
-    let effort = Effort { is_quick: arguments.quick };
-    let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
-    let given = arguments.given()?;
-    // first, for they need what may not be there, and nothing measured is lost by that
-    let peers = arguments.peers.then(|| {
-        let environment = arguments.peers_env.clone().unwrap_or_else(|| arguments.out.join("peers-env"));
-        peers(effort, &environment, progress)
-    });
-    let peers = peers.transpose()?;
-    let mut add = |chapter: Chapter, verdict: Vec<String>| {
-        report.chapters.push(chapter);
-        report.verdict.extend(verdict);
-    };
-    if is_wanted(ReportChapter::WorkPrecision) {
-        let measured = WorkPrecision::measure(effort, progress);
-        add(measured.chapter(), measured.verdict());
-    }
-    let scans =
-        is_wanted(ReportChapter::WholeScan).then(|| whole_scan(effort, given.as_ref(), progress)).transpose()?;
-    if let Some(measured) = &scans {
-        add(measured.chapter(), verdict::of_whole_scans(measured));
-    }
-    if is_wanted(ReportChapter::Convergence) {
-        let measured = convergence(effort, progress);
-        add(measured.chapter(), verdict::of_convergence(&measured));
-    }
-    let stability = is_wanted(ReportChapter::Stability).then(|| stability(effort, progress));
-    if let Some(measured) = &stability {
-        add(measured.chapter(), verdict::of_stability(measured));
-        progress("extremes");
-        let measured = extremes();
-        add(measured.chapter(), verdict::of_extremes(&measured));
-    }
-    let cost = is_wanted(ReportChapter::Cost).then(|| cost(effort, progress)).transpose()?;
-    if let Some(measured) = &cost {
-        add(measured.chapter(), verdict::of_cost(measured));
-    }
-    if let Some(measured) = peers {
-        add(measured.chapter(), verdict::of_peers(&measured));
-    }
-    report.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
-    Ok(())
-}
-
 impl ReportArguments {
+    /// Adds every selected chapter, in the order of the page.
+    fn measure(&self, report: &mut Report, progress: &mut dyn FnMut(&str)) -> Result<(), CommandError> {
+        let effort = Effort { is_quick: self.quick };
+        let is_wanted = |part| self.only.is_empty() || self.only.contains(&part);
+        let given = self.given()?;
+        // first, for they need what may not be there, and nothing measured is lost by that
+        let environment = self.peers_env.clone().unwrap_or_else(|| self.out.join("peers-env"));
+        let peers = self.peers.then(|| peers(effort, &environment, progress)).transpose()?;
+        let mut add = |chapter: Chapter, verdict: Vec<String>| {
+            report.chapters.push(chapter);
+            report.verdict.extend(verdict);
+        };
+        if is_wanted(ReportChapter::WorkPrecision) {
+            let measured = WorkPrecision::measure(effort, progress);
+            add(measured.chapter(), measured.verdict());
+        }
+        let scans =
+            is_wanted(ReportChapter::WholeScan).then(|| whole_scan::whole_scan(effort, given.as_ref(), progress));
+        let scans = scans.transpose().map_err(CommandError::WholeScan)?;
+        if let Some(measured) = &scans {
+            add(measured.chapter(), verdict::of_whole_scans(measured));
+        }
+        if is_wanted(ReportChapter::Convergence) {
+            let measured = convergence::convergence(effort, progress);
+            add(measured.chapter(), verdict::of_convergence(&measured));
+        }
+        let stability = is_wanted(ReportChapter::Stability).then(|| stability::stability(effort, progress));
+        if let Some(measured) = &stability {
+            add(measured.chapter(), verdict::of_stability(measured));
+            progress("extremes");
+            let measured = extremes::extremes();
+            add(measured.chapter(), verdict::of_extremes(&measured));
+        }
+        let cost = is_wanted(ReportChapter::Cost).then(|| cost::cost(effort, progress));
+        let cost = cost.transpose().map_err(CommandError::Cost)?;
+        if let Some(measured) = &cost {
+            add(measured.chapter(), verdict::of_cost(measured));
+        }
+        if let Some(measured) = peers {
+            add(measured.chapter(), verdict::of_peers(&measured));
+        }
+        report.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
+        Ok(())
+    }
+
     /// The case that is given by files.
     fn given(&self) -> Result<Option<GivenPart>, CommandError> {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
@@ -240,9 +236,4 @@ fn command() -> String {
     let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     let arguments = arguments.filter(|word| word != "--json");
     std::iter::once("touchup-report".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
-}
-
-/// Lines on stdout. A reader that has gone away is no error of ours.
-fn print(text: &str) {
-    let _ = writeln!(stdout(), "{text}");
 }

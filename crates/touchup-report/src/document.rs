@@ -6,7 +6,7 @@ use super::figure::{Chapter, Drawing, Figure, Table};
 use super::plot::Looks;
 
 /// Provenance of the measurements.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     /// processor, cores, memory, system
     pub machine: String,

@@ -36,11 +36,11 @@ pub fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str))
     let at_size = |&faces: &usize| {
         progress(&format!("peers: touchup at {faces} faces"));
         let input = PeersInput::new(faces, effort).map_err(RefineError::from)?;
-        let before = input.measure()?;
+        let before = input.measure("before")?;
         progress(&format!("peers: libraries at {faces} faces"));
         let printed = run_script(&python, &input)?;
         progress(&format!("peers: touchup again at {faces} faces"));
-        Ok(PeersAtSize::read(&input, [before, input.measure()?], &printed)?)
+        Ok(PeersAtSize::read(&input, [before, input.measure("after")?], &printed)?)
     };
     Ok(Peers { sizes: sizes.iter().map(at_size).collect::<Result<_, PeersError>>()? })
 }

@@ -33,22 +33,19 @@ impl Extremes {
         } else {
             format!("MISSED: {} of {} extremes got a wrong answer: {}.", wrong.len(), self.rows.len(), wrong.join("; "))
         };
-        Chapter { title: "Extremes".to_owned(), text: vec![verdict], figures: vec![], tables: vec![self.table()] }
+        Chapter::of("Extremes", vec![verdict], vec![], vec![self.table()])
     }
 
     /// One line for each.
     pub fn table(&self) -> Table {
-        Table::of(
-            "extremes",
-            "Extremes",
-            "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, alpha 0.1 m/(N s) unless \
-             stated otherwise; a ball of 1.5 mm on triangles of 2 mm.",
-            &self.rows,
-        )
-        .column("fed", |row| row.fed.as_str())
-        .column("came out", |row| row.came_out.as_str())
-        .column("right answer, and why", |row| row.right_answer.as_str())
-        .column("verdict", |row| if row.is_right { "right" } else { "WRONG" })
-        .table
+        Table::of("extremes", "Extremes", &self.rows)
+            .column("fed", |row| row.fed.as_str())
+            .column("came out", |row| row.came_out.as_str())
+            .column("right answer, and why", |row| row.right_answer.as_str())
+            .column("verdict", |row| if row.is_right { "right" } else { "WRONG" })
+            .caption(
+                "Each answer was checked by the program that made this report. f_max 10 N, h_min 0.5 mm, delta 5, \
+                 alpha 0.1 m/(N s) unless stated otherwise; a ball of 1.5 mm on triangles of 2 mm.",
+            )
     }
 }

@@ -37,7 +37,7 @@ impl Axis {
 
 /// A value with its spread over repeats: the median, and a tenth of the repeats on either side. One that was not repeated has
 /// none.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// median, or the only value
     pub median: f64,
@@ -164,6 +164,32 @@ pub struct Figure {
     pub drawing: Drawing,
 }
 
+impl Figure {
+    /// Begins one with what is drawn.
+    pub fn of(id: impl Into<String>, drawing: Drawing) -> Self {
+        let [x, y] = [Axis::linear("", ""), Axis::linear("", "")];
+        Self { id: id.into(), title: String::new(), caption: String::new(), x, y, drawing }
+    }
+
+    /// Above it.
+    #[must_use]
+    pub fn title(self, title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..self }
+    }
+
+    /// What is to the right, and what is upward.
+    #[must_use]
+    pub fn axes(self, x: Axis, y: Axis) -> Self {
+        Self { x, y, ..self }
+    }
+
+    /// Below it.
+    #[must_use]
+    pub fn caption(self, caption: impl Into<String>) -> Self {
+        Self { caption: caption.into(), ..self }
+    }
+}
+
 /// One cell of a table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -219,25 +245,19 @@ pub struct Table {
 }
 
 impl Table {
-    /// Begins a table of these rows; its columns come one by one.
-    pub fn of<R: Copy>(
-        id: &str,
-        title: &str,
-        caption: impl Into<String>,
-        rows: impl IntoIterator<Item = R>,
-    ) -> TableOf<R> {
+    /// Begins a table of these rows; its columns come one by one, its caption last.
+    pub fn of<R: Copy>(id: &str, title: &str, rows: impl IntoIterator<Item = R>) -> TableOf<R> {
         let [id, title] = [id, title].map(str::to_owned);
         let rows: Vec<R> = rows.into_iter().collect();
         let cells = vec![Vec::new(); rows.len()];
-        TableOf { rows, table: Self { id, title, caption: caption.into(), heads: Vec::new(), rows: cells } }
+        TableOf { rows, table: Self { id, title, caption: String::new(), heads: Vec::new(), rows: cells } }
     }
 }
 
 /// A table that grows column by column.
 pub struct TableOf<R> {
     rows: Vec<R>,
-    /// with the columns so far
-    pub table: Table,
+    table: Table,
 }
 
 impl<R: Copy> TableOf<R> {
@@ -249,6 +269,11 @@ impl<R: Copy> TableOf<R> {
             cells.push(cell(*row).into());
         }
         self
+    }
+
+    /// The table, with what is below it.
+    pub fn caption(self, caption: impl Into<String>) -> Table {
+        Table { caption: caption.into(), ..self.table }
     }
 }
 
@@ -263,4 +288,11 @@ pub struct Chapter {
     pub figures: Vec<Figure>,
     /// tables, in order
     pub tables: Vec<Table>,
+}
+
+impl Chapter {
+    /// Of its parts, in order.
+    pub fn of(title: &str, text: Vec<String>, figures: Vec<Figure>, tables: Vec<Table>) -> Self {
+        Self { title: title.to_owned(), text, figures, tables }
+    }
 }

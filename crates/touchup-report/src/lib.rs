@@ -4,40 +4,26 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod allocations;
-mod convergence;
+pub mod convergence;
 pub mod cost;
 mod csv;
-mod document;
-mod extremes;
+pub mod document;
+pub mod error;
+pub mod extremes;
 mod figure;
-mod files;
+pub mod files;
 mod number;
 mod page;
 pub mod peers;
 mod plot;
-mod stability;
+pub mod stability;
 pub mod verdict;
-mod whole_scan;
+pub mod whole_scan;
 pub mod work_precision;
 
-pub use convergence::{
-    BLOWN_UP, Convergence, Decay, Law, Line, MeshErrors, PaperSweeps, RobustSweeps, Rule, SweepError, SweepRun,
-    convergence, fit_decay, noisy, raster_samples, straight_line,
-};
-pub use document::Report;
-pub use extremes::{Extreme, Extremes, extremes};
 pub use figure::{
     Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell, TableOf,
 };
-pub use files::{OutputFile, ReportError};
-pub use number::three_digits;
-pub use peers::Peers;
-pub use stability::{BadShape, FaceShares, Integrator, MeshShares, RunEnding, Stability, SubFlowError, stability};
-pub use whole_scan::{
-    CaseResult, ContactSculptor, GaussianCost, GaussianParams, GaussianProcess, GaussianSurface, GivenPart,
-    MethodResult, Reach, RefineMethod, ScanResult, TouchedError, WholeScan, WholeScanError, whole_scan,
-};
-pub use work_precision::WorkPrecision;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

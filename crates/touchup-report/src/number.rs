@@ -16,13 +16,12 @@ pub fn three_digits(value: f64) -> String {
     // rounded first: 999.7 is a number of four digits before the point
     let rounded = format!("{value:.2e}");
     let (digits, exponent) = rounded.split_once('e').unwrap_or((&rounded, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    let magnitude: f64 = rounded.parse::<f64>().unwrap_or(value).abs();
-    if WRITTEN_OUT.contains(&magnitude) {
-        let decimals = usize::try_from(2 - exponent).unwrap_or(0);
-        return trimmed(&format!("{:.decimals$}", rounded.parse::<f64>().unwrap_or(value)));
+    // read again they lose the zeros that say nothing
+    let [rounded, digits] = [&rounded, digits].map(|text| text.parse().unwrap_or(value));
+    if WRITTEN_OUT.contains(&rounded.abs()) {
+        return rounded.to_string();
     }
-    format!("{}·{}", trimmed(digits), power_of_ten(exponent))
+    format!("{digits}·{}", power_of_ten(exponent.parse().unwrap_or(0)))
 }
 
 /// 10 with a raised exponent: 10⁻⁷.
@@ -36,10 +35,6 @@ pub fn power_of_ten(exponent: i32) -> String {
 /// The smallest and the largest; `None` where there are none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().map(|value| (value, value)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
-
-fn trimmed(digits: &str) -> String {
-    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.').to_owned() } else { digits.to_owned() }
 }
 
 #[cfg(test)]

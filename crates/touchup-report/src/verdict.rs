@@ -1,10 +1,14 @@
 //! The practitioner's questions, answered by the measurements: which mode, step and region, at which rate, what it costs, and
 //! where it fails.
 
+use super::convergence::{Convergence, Rule};
 use super::cost::Cost;
+use super::extremes::Extremes;
 use super::figure::{Table, TableCell};
-use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult};
-use super::{Convergence, Extremes, Integrator, Peers, Rule, Stability, WholeScan, three_digits};
+use super::number::three_digits;
+use super::peers::{Peers, PeersAtSize};
+use super::stability::{Integrator, Stability};
+use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, WholeScan};
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` where no method made any scan better.
 pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Cost>) -> Option<Table> {
@@ -102,25 +106,22 @@ fn of_case(case: &CaseResult) -> Option<String> {
         let [mm, us] = [result.mean_mm(), result.per_sample_us.median].map(three_digits);
         format!("{} ({mm} mm, {us} µs per sample)", result.name)
     };
-    let mut text = format!("On {}, scanned {} mm off in the mean, ", case.name, three_digits(scan.before.mean_mm()));
-    match scan.best() {
-        Some(best) => text += &format!("take {}.", describe(best)),
-        None => text += "no method reduced the error.",
-    }
-    if let Some(haptic) = scan.best_haptic() {
-        text += &format!(" Of the regions of the haptic update alone take {}.", describe(haptic));
-    }
-    let failed: Vec<&str> =
-        scan.methods.iter().filter(|result| !result.is_sound()).map(|result| result.name.as_str()).collect();
-    if !failed.is_empty() {
-        text += &format!(" Fails here (worse than the scan, or not at the end in time): {}.", failed.join("; "));
-    }
-    if let (Some(patch), true) = (scan.of(RefineMethod::Patch), case.duration_s > 0.0) {
+    let best = scan.best().map_or("no method reduced the error".to_owned(), |best| format!("take {}", describe(best)));
+    let haptic = scan.best_haptic().map(describe);
+    let failed = scan.methods.iter().filter(|result| !result.is_sound()).map(|result| result.name.as_str());
+    let failed = Some(failed.collect::<Vec<_>>().join("; ")).filter(|failed| !failed.is_empty());
+    let patch = scan.of(RefineMethod::Patch).filter(|_| case.duration_s > 0.0).map(|patch| {
         let rate = case.samples as f64 / case.duration_s;
         let [rate, percent] = [rate, 100.0 * rate * patch.per_sample_us.median * 1e-6].map(three_digits);
-        text += &format!(" At {rate} samples per second the patch takes {percent} % of one core.");
-    }
-    Some(text)
+        format!(" At {rate} samples per second the patch takes {percent} % of one core.")
+    });
+    let texts = [
+        Some(format!("On {}, scanned {} mm off in the mean, {best}.", case.name, three_digits(scan.before.mean_mm()))),
+        haptic.map(|haptic| format!(" Of the regions of the haptic update alone take {haptic}.")),
+        failed.map(|failed| format!(" Fails here (worse than the scan, or not at the end in time): {failed}.")),
+        patch,
+    ];
+    Some(texts.into_iter().flatten().collect())
 }
 
 /// How many sweeps it takes, and how often the published rule blows up.
@@ -136,7 +137,8 @@ pub fn of_convergence(measured: &Convergence) -> Vec<String> {
 pub fn of_stability(measured: &Stability) -> Vec<String> {
     let share = |integrator| {
         let shares = measured.faces.iter().find(|shares| shares.integrator == integrator)?;
-        Some(format!("{} {} % of {}", integrator.name(), three_digits(100.0 * shares.stable_share), shares.runs))
+        let stable = three_digits(100.0 * shares.endings.stable_share());
+        Some(format!("{integrator} {stable} % of {}", shares.endings.runs()))
     };
     let others = Integrator::ALL.into_iter().filter(|&integrator| integrator != Integrator::Lie).filter_map(share);
     let mut text = format!(
@@ -183,7 +185,7 @@ pub fn of_cost(measured: &Cost) -> Vec<String> {
 
 /// Comparison with the libraries that others would use.
 pub fn of_peers(measured: &Peers) -> Vec<String> {
-    let at_size = |size: &super::peers::PeersAtSize| {
+    let at_size = |size: &PeersAtSize| {
         let [pipeline, query] = [size.pipeline_factor()?, size.query_factor()?].map(three_digits);
         Some(format!(
             "at {} faces a push is {pipeline} times faster than the fastest pipeline with an exact index, and {query} times as \
@@ -199,7 +201,7 @@ pub fn of_peers(measured: &Peers) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Reach, TouchedError};
+    use crate::whole_scan::{Reach, TouchedError};
 
     fn result(method: RefineMethod, name: &str, mean_mm: f64, per_sample_us: f64, is_worse: bool) -> MethodResult {
         let error = TouchedError {

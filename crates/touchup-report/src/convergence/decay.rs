@@ -25,34 +25,20 @@ pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
     Some(Line { offset: y - slope * x, slope, left: (left / n).sqrt(), r_squared })
 }
 
-/// One law: e(sweep) = start · exp(−rate · x), x the sweep or its logarithm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Law {
-    /// of an exponential law for each sweep; of a power law the exponent
-    pub rate: f64,
-    /// of an exponential law the error at sweep 0, of a power law that at sweep 1, in the unit of the errors
-    pub start: f64,
-    /// root mean square residual of the law in the logarithm
-    pub left: f64,
-    /// share of the variance of the logarithm that it explains; `None` where that does not vary
-    pub r_squared: Option<f64>,
-}
-
-/// Both laws of the same errors.
+/// Both laws of the same errors, each as a line through their logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decay {
-    /// e ∝ exp(−rate · sweep) \[paper, Fig 11\]
-    pub exponential: Law,
-    /// e ∝ sweep^−rate
-    pub power: Law,
+    /// e ∝ exp(−rate · sweep) \[paper, Fig 11\], over the sweep: falls by the rate
+    pub exponential: Line,
+    /// e ∝ sweep^−exponent, over the logarithm of the sweep: falls by the exponent
+    pub power: Line,
 }
 
 /// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that is not above 0.
 pub fn fit_decay(errors: &[f64]) -> Option<Decay> {
     let fit = |x: fn(f64) -> f64| {
-        let points: Vec<_> = errors.iter().enumerate().map(|(i, e)| (x(i as f64 + 1.0), e.ln())).collect();
-        let Line { offset, slope, left, r_squared } = straight_line(&points)?;
-        Some(Law { rate: -slope, start: offset.exp(), left, r_squared })
+        let points = errors.iter().enumerate().map(|(i, e)| (x(i as f64 + 1.0), e.ln()));
+        straight_line(&points.collect::<Vec<_>>())
     };
     Some(Decay { exponential: fit(|sweep| sweep)?, power: fit(f64::ln)? })
 }
@@ -61,6 +47,6 @@ impl Decay {
     /// The error after `sweep` (1 or later) by the exponential and by the power law.
     pub fn at(&self, sweep: f64) -> [f64; 2] {
         let Self { exponential, power } = self;
-        [exponential.start * (-exponential.rate * sweep).exp(), power.start * sweep.powf(-power.rate)]
+        [exponential.offset.exp() * (exponential.slope * sweep).exp(), power.offset.exp() * sweep.powf(power.slope)]
     }
 }

@@ -6,12 +6,13 @@ mod errors;
 mod sweeps;
 mod text;
 
-pub use decay::{Decay, Law, Line, fit_decay, straight_line};
+pub use decay::{Decay, Line, fit_decay, straight_line};
 pub use errors::MeshErrors;
 pub(super) use sweeps::region_over;
-pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, SweepError, noisy, raster_samples};
+pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 use super::Effort;
+use super::error::Measured;
 use touchup_core::names;
 use touchup_core::stylus::Sample;
 use touchup_sim::Peaks;
@@ -73,20 +74,18 @@ impl SweepRun {
         (rule, seed, edge): (Rule, u64, f64),
         start: MeshErrors,
         count: usize,
-        mut sweep: impl FnMut() -> Result<MeshErrors, SweepError>,
+        mut sweep: impl FnMut() -> Measured<MeshErrors>,
     ) -> Self {
         let (mut errors, mut ended, mut has_blown_up) = (vec![start], None, false);
         for number in 1..=count {
-            match sweep() {
+            ended = match sweep() {
                 Ok(now) => {
                     errors.push(now);
                     has_blown_up = now.distance_mm > BLOWN_UP * start.distance_mm;
+                    has_blown_up.then(|| format!("blew up in sweep {number}"))
                 }
-                Err(error) => ended = Some(format!("sweep {number}: {error}")),
-            }
-            if has_blown_up {
-                ended = Some(format!("blew up in sweep {number}"));
-            }
+                Err(error) => Some(format!("sweep {number}: {error}")),
+            };
             if ended.is_some() {
                 break;
             }
@@ -108,44 +107,36 @@ impl SweepRun {
 pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergence {
     let (scans, sweeps) = (effort.choose(2, 6), effort.choose(4, 10));
     let seeds = FIRST_SEED..FIRST_SEED + scans;
-    let mut found = Convergence { sweeps, runs: Vec::new(), failed: Vec::new() };
+    let mut runs = Vec::new();
     for seed in seeds.clone() {
         progress(&format!("convergence: published rule, scan {seed}"));
-        found.take(paper_run(seed, sweeps));
+        runs.push(paper_run(seed, sweeps));
     }
     let peaks = Peaks::default();
     progress("convergence: touching peaks");
     match raster_samples(&peaks, FRICTION) {
-        Err(error) => found.failed.push(error.to_string()),
-        Ok(samples) => {
-            for seed in seeds {
-                progress(&format!("convergence: robust mode, scan {seed}"));
-                found.take(robust_run(&peaks, &samples, seed, sweeps));
-            }
-        }
+        Err(error) => runs.push(Err(error)),
+        Ok(samples) => runs.extend(seeds.map(|seed| {
+            progress(&format!("convergence: robust mode, scan {seed}"));
+            robust_run(&peaks, &samples, seed, sweeps)
+        })),
     }
-    found
+    let failed = runs.iter().filter_map(|run| Some(run.as_ref().err()?.to_string())).collect();
+    Convergence { sweeps, runs: runs.into_iter().flatten().collect(), failed }
 }
 
-fn paper_run(seed: u64, sweeps: usize) -> Result<SweepRun, SweepError> {
+fn paper_run(seed: u64, sweeps: usize) -> Measured<SweepRun> {
     let mut run = PaperSweeps::new(PAPER_EDGE, None, seed)?;
     let start = run.errors();
     Ok(SweepRun::of((Rule::Paper, seed, PAPER_EDGE), start, sweeps, || run.sweep(start.distance_mm)))
 }
 
-fn robust_run(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) -> Result<SweepRun, SweepError> {
+fn robust_run(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) -> Measured<SweepRun> {
     let mut run = RobustSweeps::new(peaks, noisy(&peaks.mesh(ROBUST_EDGE)?, seed), samples)?;
     Ok(SweepRun::of((Rule::Robust, seed, ROBUST_EDGE), run.errors(), sweeps, || run.sweep()))
 }
 
 impl Convergence {
-    fn take(&mut self, run: Result<SweepRun, SweepError>) {
-        match run {
-            Ok(run) => self.runs.push(run),
-            Err(error) => self.failed.push(error.to_string()),
-        }
-    }
-
     /// The runs of one rule.
     pub fn of(&self, rule: Rule) -> impl Iterator<Item = &SweepRun> {
         self.runs.iter().filter(move |run| run.rule == rule)

@@ -3,13 +3,14 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use super::errors::MeshErrors;
-use touchup_core::haptic::{GuardParams, RefineError, RefineParams, Refiner, TipParams};
+use crate::error::Measured;
+use touchup_core::haptic::{GuardParams, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Sample, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
-    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, SimError, StylusParams, Surface, add_vertex_noise,
-    raster, touch,
+    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, StylusParams, Surface, add_vertex_noise, raster,
+    touch,
 };
 
 /// Time between two samples of the paper, ns and s.
@@ -21,17 +22,6 @@ const SAMPLES_PER_FACE: usize = 4000;
 pub const BLOWN_UP: f64 = 2.0;
 /// The raster's ball, m, and its stiffness, N/m.
 const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
-
-/// Why a sweep was not made.
-#[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    /// The simulated surface or stylus.
-    #[error(transparent)]
-    Sim(#[from] SimError),
-    /// The refiner.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-}
 
 /// The true mesh with 3 mm of noise on each coordinate, 2 mm too high \[paper\].
 pub fn noisy(truth: &TriMesh, seed: u64) -> TriMesh {
@@ -54,8 +44,8 @@ impl PaperSweeps {
     /// Sweeps over a noisy scan of `peaks` with legs of `edge` (m).
     ///
     /// # Errors
-    /// [`SweepError`] for an edge that is no length.
-    pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Result<Self, SweepError> {
+    /// [`MeasureError`](crate::error::MeasureError) for an edge that is no length.
+    pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Measured<Self> {
         let truth = Peaks::default().mesh(edge)?;
         let params = RefineParams { guard, ..RefineParams::paper(TipParams { radius: 0.0, stiffness: None }) };
         let refiner = Refiner::new(noisy(&truth, seed), params)?;
@@ -68,8 +58,8 @@ impl PaperSweeps {
     /// Stops when the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.
     ///
     /// # Errors
-    /// [`SweepError::Refine`] for a step that was refused.
-    pub fn sweep(&mut self, start_mm: f64) -> Result<MeshErrors, SweepError> {
+    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a step that was refused.
+    pub fn sweep(&mut self, start_mm: f64) -> Measured<MeshErrors> {
         let faces: Vec<_> = self.truth.faces().map(|(face, _)| face).collect();
         let (model, stylus) = (self.params.dynamics.model, GuidedStylus::default());
         for face in faces {
@@ -113,8 +103,8 @@ pub(crate) fn region_over(peaks: &Peaks, half: f64, radius: f64) -> RasterRegion
 /// One raster of a ball over the whole square: what a perfect sensor reports every millisecond.
 ///
 /// # Errors
-/// [`SweepError::Sim`] for a friction that is none.
-pub fn raster_samples(peaks: &Peaks, friction: f64) -> Result<Vec<Sample>, SweepError> {
+/// [`MeasureError::Sim`](crate::error::MeasureError::Sim) for a friction that is none.
+pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
     let TipParams { radius, stiffness } = TIP;
     let stiffness = stiffness.unwrap_or(f64::INFINITY);
     let region = region_over(peaks, 0.5 * 50e-3, radius);
@@ -153,8 +143,8 @@ impl<'a> RobustSweeps<'a> {
     /// - `scan`: with the noise of [`noisy`]; `samples`: of [`raster_samples`].
     ///
     /// # Errors
-    /// [`SweepError::Refine`] for a scan without faces.
-    pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> Result<Self, SweepError> {
+    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a scan without faces.
+    pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> Measured<Self> {
         let params = RefineParams { scan_noise: 3e-3, ..RefineParams::robust(TIP) };
         Ok(Self { peaks, samples, refiner: Refiner::new(scan, params)?, last_ns: 0 })
     }
@@ -162,8 +152,8 @@ impl<'a> RobustSweeps<'a> {
     /// Goes over the square once.
     ///
     /// # Errors
-    /// [`SweepError::Refine`] for a sample that was refused.
-    pub fn sweep(&mut self) -> Result<MeshErrors, SweepError> {
+    /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a sample that was refused.
+    pub fn sweep(&mut self) -> Measured<MeshErrors> {
         let start_ns = self.last_ns;
         for sample in self.samples {
             self.last_ns = start_ns + sample.stamp_ns;

@@ -13,12 +13,8 @@ impl Convergence {
         let mut text = vec![self.introduction()];
         text.extend(Rule::ALL.into_iter().map(|rule| self.verdict(rule)));
         text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
-        Chapter {
-            title: "Convergence from sweep to sweep".to_owned(),
-            text,
-            figures: Rule::ALL.map(|rule| self.figure(rule)).into(),
-            tables: vec![self.table()],
-        }
+        let figures = Rule::ALL.map(|rule| self.figure(rule)).into();
+        Chapter::of("Convergence from sweep to sweep", text, figures, vec![self.table()])
     }
 
     fn introduction(&self) -> String {
@@ -40,7 +36,9 @@ impl Convergence {
         let (name, fewer, all) = (capitalised(rule.name()), converged.len(), runs.len());
         let mut text =
             format!("{name}: {fewer} of {all} scans ended with less error than they began with, {blown_up} blew up.");
-        if let Some((least, most)) = range(converged.iter().filter_map(|run| share_left(run))) {
+        if let Some((least, most)) = range(
+            converged.iter().filter_map(|run| Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)),
+        ) {
             let (least, most, sweeps) = (least * 100.0, most * 100.0, self.sweeps);
             text += &format!(
                 " Where it converged, {least:.1} to {most:.1} % of the mean error is left after {sweeps} sweeps."
@@ -54,7 +52,7 @@ impl Convergence {
         if let (Some(power), Some(exponential)) =
             (mean(|decay| decay.power.r_squared), mean(|decay| decay.exponential.r_squared))
         {
-            let exponents = runs.iter().filter_map(|run| Some(run.decay?.power.rate));
+            let exponents = runs.iter().filter_map(|run| Some(-run.decay?.power.slope));
             let (least, most) = range(exponents).unwrap_or_default();
             text += &format!(
                 " The power law fits better in {wins} of {fits} scans; mean R² {power:.3} for the power law (exponent \
@@ -76,45 +74,39 @@ impl Convergence {
             Rule::Paper => ("convergence_published", "face by face, as the paper measures"),
             Rule::Robust => ("convergence_robust", "from the faces' middles to the surface"),
         };
-        Figure {
-            id: id.to_owned(),
-            title: format!("Mean distance error from sweep to sweep, {}", rule.name()),
-            caption: format!(
-                "Marks: measured {measure}; sweep 0 is the scan. Dashed: both laws, fitted from sweep 1 on. A straight line \
-                 is an exponential. One run of each scan: the same samples give the same mesh to the last bit."
-            ),
-            x: Axis::linear("sweep", "sweep"),
-            y: Axis::log("mean distance error, mm", "distance_error_mm"),
-            drawing: Drawing::Curves(series.collect()),
-        }
+        Figure::of(id, Drawing::Curves(series.collect()))
+            .title(format!("Mean distance error from sweep to sweep, {}", rule.name()))
+            .axes(Axis::linear("sweep", "sweep"), Axis::log("mean distance error, mm", "distance_error_mm"))
+            .caption(format!(
+                "Marks: measured {measure}; sweep 0 is the scan. Dashed: both laws, fitted from sweep 1 on. A \
+                 straight line is an exponential. One run of each scan: the same samples give the same mesh to the \
+                 last bit."
+            ))
     }
 
     fn table(&self) -> Table {
         let error_at = |sweep: usize| move |run: &SweepRun| Some(run.errors.get(sweep)?.distance_mm);
         let last = |of: fn(&MeshErrors) -> f64| move |run: &SweepRun| run.errors.last().map(of);
-        Table::of(
-            "convergence",
-            "Sweeps and fits",
-            "Mean distance and mean angle of the faces; R² of the logarithm of the error, from sweep 1 on. A scan that blew up \
-             has no fit, and ends where its error was twice that of its start.",
-            &self.runs,
-        )
-        .column("rule", |run| run.rule.name())
-        .column("scan", |run| run.seed as f64)
-        .column("edge, mm", |run| run.edge_mm)
-        .column("sweeps", |run| run.errors.len().saturating_sub(1))
-        .column("error before, mm", error_at(0))
-        .column("after 1 sweep, mm", error_at(1))
-        .column("at the end, mm", last(|error| error.distance_mm))
-        .column("normals before, deg", |run| Some(run.errors.first()?.normal_deg))
-        .column("normals at the end, deg", last(|error| error.normal_deg))
-        .column("flipped at the end", last(|error| error.flipped as f64))
-        .column("power law: exponent", |run| Some(run.decay?.power.rate))
-        .column("power law: R²", |run| run.decay?.power.r_squared)
-        .column("exponential: rate a sweep", |run| Some(run.decay?.exponential.rate))
-        .column("exponential: R²", |run| run.decay?.exponential.r_squared)
-        .column("remark", |run| run.ended.as_deref())
-        .table
+        Table::of("convergence", "Sweeps and fits", &self.runs)
+            .column("rule", |run| run.rule.name())
+            .column("scan", |run| run.seed as f64)
+            .column("edge, mm", |run| run.edge_mm)
+            .column("sweeps", |run| run.errors.len().saturating_sub(1))
+            .column("error before, mm", error_at(0))
+            .column("after 1 sweep, mm", error_at(1))
+            .column("at the end, mm", last(|error| error.distance_mm))
+            .column("normals before, deg", |run| Some(run.errors.first()?.normal_deg))
+            .column("normals at the end, deg", last(|error| error.normal_deg))
+            .column("flipped at the end", last(|error| error.flipped as f64))
+            .column("power law: exponent", |run| Some(-run.decay?.power.slope))
+            .column("power law: R²", |run| run.decay?.power.r_squared)
+            .column("exponential: rate a sweep", |run| Some(-run.decay?.exponential.slope))
+            .column("exponential: R²", |run| run.decay?.exponential.r_squared)
+            .column("remark", |run| run.ended.as_deref())
+            .caption(
+                "Mean distance and mean angle of the faces; R² of the logarithm of the error, from sweep 1 on. A scan \
+                 that blew up has no fit, and ends where its error was twice that of its start.",
+            )
     }
 }
 
@@ -125,11 +117,6 @@ fn drawn(decay: &Decay, name: &str, sweeps: usize) -> [Series; 2] {
         let marks = (0..=STEPS * (sweeps - 1)).map(at).map(|sweep| Mark::at(sweep, decay.at(sweep)[which]));
         Series::new(format!("{name}, {law}"), LineStroke::Dashed, marks)
     })
-}
-
-/// The share of the error that is left at the end.
-fn share_left(run: &SweepRun) -> Option<f64> {
-    Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)
 }
 
 fn capitalised(text: &str) -> String {

@@ -13,22 +13,9 @@ const DISCERNIBLE: f64 = 0.02;
 impl Cost {
     /// As it is printed.
     pub fn chapter(&self) -> Chapter {
-        Chapter {
-            title: "Cost of each stage".to_owned(),
-            text: [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()]
-                .into_iter()
-                .flatten()
-                .chain([self.count_text()])
-                .collect(),
-            figures: vec![self.size_figure()],
-            tables: vec![
-                self.size_table(),
-                self.part_table(),
-                self.stage_table(),
-                self.seldom_table(),
-                self.replay_table(),
-            ],
-        }
+        let texts = [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()];
+        let text = texts.into_iter().flatten().chain([self.count_text()]).collect();
+        Chapter::of("Cost of each stage", text, vec![self.size_figure()], self.tables())
     }
 
     fn size_figure(&self) -> Figure {
@@ -38,32 +25,25 @@ impl Cost {
         };
         let series =
             |name, time: fn(&SizeCost) -> &PerSample| curve(name, LineStroke::Joined, &|size| time(size).time_ns);
-        let laws = [
-            ("law of the cheapest scene", self.barest_law),
-            ("law of the default scene, 1 mm edges", self.default_law),
-        ];
+        let law = |name, law: Option<LogLaw>| {
+            law.map(|law| curve(name, LineStroke::Dashed, &|size| law.at(size.faces).into()))
+        };
         let mut curves = vec![
             series("hand-written loop", |size| &size.minimal),
             series("cheapest scene", |size| &size.barest),
             series("default scene, scan of 1 mm edges", |size| &size.default_larger),
             series("default scene, scan of 0.3 m", |size| &size.default_finer),
         ];
-        curves.extend(laws.into_iter().filter_map(|(name, law)| {
-            let law = law?;
-            Some(curve(name, LineStroke::Dashed, &|size| law.at(size.faces).into()))
-        }));
-        Figure {
-            id: "push_time_by_faces".to_owned(),
-            title: "One push against the size of the scan".to_owned(),
-            caption: format!(
-                "Median and p10–p90 of blocks of samples, all cases in turns. Dashed: t = a + b ln F, fitted to the scans of \
-                 up to {LAW_UP_TO} faces. What lies above it is the cache; where a scan of one size gets finer, more \
-                 vertices move with each touch.",
-            ),
-            x: Axis::log("faces of the scan", "faces"),
-            y: Axis::log("time of one push, µs", "push_us"),
-            drawing: Drawing::Curves(curves),
-        }
+        curves.extend(law("law of the cheapest scene", self.barest_law));
+        curves.extend(law("law of the default scene, 1 mm edges", self.default_law));
+        Figure::of("push_time_by_faces", Drawing::Curves(curves))
+            .title("One push against the size of the scan")
+            .axes(Axis::log("faces of the scan", "faces"), Axis::log("time of one push, µs", "push_us"))
+            .caption(format!(
+                "Median and p10–p90 of blocks of samples, all cases in turns. Dashed: t = a + b ln F, fitted to the \
+                 scans of up to {LAW_UP_TO} faces. What lies above it is the cache; where a scan of one size gets \
+                 finer, more vertices move with each touch.",
+            ))
     }
 
     fn size_text(&self) -> Option<String> {
@@ -154,83 +134,63 @@ impl Cost {
         format!("A push that is warm {bound} for memory, counted by the allocator itself over every timed push.")
     }
 
-    fn size_table(&self) -> Table {
-        Table::of(
-            "push_by_faces",
-            "A push, by size of the scan",
-            "Cheapest scene and hand-written loop on a plate of 0.3 m; the default scene without patch, on a plate of edges of \
-             1 mm and on the one of 0.3 m. Memory is counted from what mesh and tree own.",
-            &self.sizes,
-        )
-        .column("faces", |size| size.faces)
-        .column("hand-written loop, ns", |size| size.minimal.time_ns)
-        .column("cheapest scene, ns", |size| size.barest.time_ns)
-        .column("cheapest / loop", |size| size.barest_to_minimal)
-        .column("loop that keeps, ns", |size| size.keeping.time_ns)
-        .column("cheapest / keeping loop", |size| size.barest_to_keeping)
-        .column("default, 1 mm edges, ns", |size| size.default_larger.time_ns)
-        .column("default, 0.3 m, ns", |size| size.default_finer.time_ns)
-        .column("vertices moved at 0.3 m", |size| size.moved_finer)
-        .column("allocations", |size| size.default_larger.allocations)
-        .column("mesh, bytes/face", |size| size.mesh_bytes_per_face)
-        .column("tree, bytes/face", |size| size.tree_bytes_per_face)
-        .column("tree built, ms", |size| size.tree_build_ms)
-        .table
-    }
-
-    fn part_table(&self) -> Table {
-        Table::of(
-            "push_by_part",
-            "A push with and without each optional part",
-            "The default scene without patch on a scan of edges of 1 mm, switched in one part. The cost is the difference block \
-             by block; a negative one says that the work of the rest grows without the part.",
-            &self.parts,
-        )
-        .column("part", |part| part.part.as_str())
-        .column("faces", |part| part.faces)
-        .column("by default", |part| if part.is_default { "yes" } else { "no" })
-        .column("push with it, ns", |part| part.with.time_ns)
-        .column("push without it, ns", |part| part.without.time_ns)
-        .column("cost, ns", |part| part.cost_ns)
-        .column("allocations with it", |part| part.with.allocations)
-        .column("bytes asked for with it", |part| part.with.allocated_bytes)
-        .table
-    }
-
-    fn stage_table(&self) -> Table {
-        Table::of(
-            "stages",
-            "Stages by themselves, per sample",
-            "Each called alone over the samples of the slide, all in turns. What keeps the whole session (touches, recording) \
-             asks for memory as it grows. Deformation has no name of its own to be called by: it is what a push takes beyond \
-             these.",
-            &self.stages,
-        )
-        .column("stage", |stage| stage.stage.as_str())
-        .column("faces", |stage| stage.faces)
-        .column("time, ns", |stage| stage.per_sample.time_ns)
-        .column("allocations", |stage| stage.per_sample.allocations)
-        .column("bytes asked for", |stage| stage.per_sample.allocated_bytes)
-        .table
-    }
-
-    fn seldom_table(&self) -> Table {
-        let caption = "Beside the samples, on threads of their own.";
-        Table::of("seldom", "What is not done at each sample", caption, &self.seldom)
-            .column("work", |seldom| seldom.work.as_str())
-            .column("faces", |seldom| seldom.faces)
-            .column("time, ms", |seldom| seldom.time_ms)
-            .table
-    }
-
-    fn replay_table(&self) -> Table {
-        let caption = "From the MCAP file to the moved mesh: decoding, synchronising, pushing.";
-        Table::of("replay", "Replay by one thread", caption, &self.replays)
-            .column("scene", |replay| replay.scene.as_str())
-            .column("faces", |replay| replay.faces)
-            .column("edge, mm", |replay| replay.edge_mm)
-            .column("samples", |replay| replay.samples)
-            .column("samples/s", |replay| replay.samples_per_s)
-            .table
+    fn tables(&self) -> Vec<Table> {
+        vec![
+            Table::of("push_by_faces", "A push, by size of the scan", &self.sizes)
+                .column("faces", |size| size.faces)
+                .column("hand-written loop, ns", |size| size.minimal.time_ns)
+                .column("cheapest scene, ns", |size| size.barest.time_ns)
+                .column("cheapest / loop", |size| size.barest_to_minimal)
+                .column("loop that keeps, ns", |size| size.keeping.time_ns)
+                .column("cheapest / keeping loop", |size| size.barest_to_keeping)
+                .column("default, 1 mm edges, ns", |size| size.default_larger.time_ns)
+                .column("default, 0.3 m, ns", |size| size.default_finer.time_ns)
+                .column("vertices moved at 0.3 m", |size| size.moved_finer)
+                .column("allocations", |size| size.default_larger.allocations)
+                .column("mesh, bytes/face", |size| size.mesh_bytes_per_face)
+                .column("tree, bytes/face", |size| size.tree_bytes_per_face)
+                .column("tree built, ms", |size| size.tree_build_ms)
+                .caption(
+                    "Cheapest scene and hand-written loop on a plate of 0.3 m; the default scene without patch, on a \
+                     plate of edges of 1 mm and on the one of 0.3 m. Memory is counted from what mesh and tree own.",
+                ),
+            Table::of("push_by_part", "A push with and without each optional part", &self.parts)
+                .column("part", |part| part.part.as_str())
+                .column("faces", |part| part.faces)
+                .column("by default", |part| if part.is_default { "yes" } else { "no" })
+                .column("push with it, ns", |part| part.with.time_ns)
+                .column("push without it, ns", |part| part.without.time_ns)
+                .column("cost, ns", |part| part.cost_ns)
+                .column("allocations with it", |part| part.with.allocations)
+                .column("bytes asked for with it", |part| part.with.allocated_bytes)
+                .caption(
+                    "The default scene without patch on a scan of edges of 1 mm, switched in one part. The cost is \
+                     the difference block by block; a negative one says that the work of the rest grows without the \
+                     part.",
+                ),
+            Table::of("stages", "Stages by themselves, per sample", &self.stages)
+                .column("stage", |stage| stage.stage.as_str())
+                .column("faces", |stage| stage.faces)
+                .column("time, ns", |stage| stage.per_sample.time_ns)
+                .column("allocations", |stage| stage.per_sample.allocations)
+                .column("bytes asked for", |stage| stage.per_sample.allocated_bytes)
+                .caption(
+                    "Each called alone over the samples of the slide, all in turns. What keeps the whole session \
+                     (touches, recording) asks for memory as it grows. Deformation has no name of its own to be \
+                     called by: it is what a push takes beyond these.",
+                ),
+            Table::of("seldom", "What is not done at each sample", &self.seldom)
+                .column("work", |seldom| seldom.work.as_str())
+                .column("faces", |seldom| seldom.faces)
+                .column("time, ms", |seldom| seldom.time_ms)
+                .caption("Beside the samples, on threads of their own."),
+            Table::of("replay", "Replay by one thread", &self.replays)
+                .column("scene", |replay| replay.scene.as_str())
+                .column("faces", |replay| replay.faces)
+                .column("edge, mm", |replay| replay.edge_mm)
+                .column("samples", |replay| replay.samples)
+                .column("samples/s", |replay| replay.samples_per_s)
+                .caption("From the MCAP file to the moved mesh: decoding, synchronising, pushing."),
+        ]
     }
 }

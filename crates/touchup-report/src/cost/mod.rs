@@ -1,22 +1,19 @@
 //! What each stage costs, with and without each optional part, and for scans of every size.
 
 mod chapter;
-mod error;
 mod log_law;
 mod minimal;
-mod parts;
+mod pushes;
 mod replay;
-mod sizes;
 mod stages;
 mod turns;
 
 use super::Effort;
-pub use error::CostError;
+use super::error::Measured;
 pub use log_law::LogLaw;
 pub use minimal::MinimalLoop;
-pub use parts::PartCost;
+pub use pushes::{BAREST, PartCost, SizeCost};
 pub use replay::{READING, ReplaySpeed};
-pub use sizes::{BAREST, SizeCost};
 pub use stages::{SeldomCost, StageCost};
 pub use turns::PerSample;
 use turns::Timing;
@@ -52,8 +49,8 @@ pub struct Cost {
 /// Measures all of it.
 ///
 /// # Errors
-/// [`CostError`].
-pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, CostError> {
+/// [`MeasureError`](crate::error::MeasureError).
+pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     let sizes: &[usize] = effort.choose(
         &[10_000, 30_000, 100_000],
         &[10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000],
@@ -62,7 +59,7 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, Cost
         .choose(Timing { warm: 3_000, blocks: 15, block: 400 }, Timing { warm: 20_000, blocks: 40, block: 1_000 });
     let at_size = |&faces: &usize| {
         progress(&format!("cost: a push on {faces} faces"));
-        sizes::size_cost(faces, timing)
+        pushes::size_cost(faces, timing)
     };
     let sizes = sizes.iter().map(at_size).collect::<Result<Vec<_>, _>>()?;
     let (mut parts, mut stages, mut seldom) = (Vec::new(), Vec::new(), Vec::new());
@@ -70,7 +67,7 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, Cost
         progress(&format!("cost: parts and stages on {faces} faces"));
         // eight refiners at once: on the largest scans they would take 5 GB
         if faces <= 1_000_000 {
-            parts.extend(parts::part_costs(faces, timing)?);
+            parts.extend(pushes::part_costs(faces, timing)?);
         }
         stages.extend(stages::stage_costs(faces, timing)?);
     }
@@ -80,7 +77,7 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Result<Cost, Cost
     }
     let (count, repeats) = effort.choose((30_000, 3), (300_000, 7));
     progress("cost: replay on 1,000,000 faces");
-    let mut replays = replay::replay_speeds((1_000_000, sizes::side_of(1_000_000)), count, repeats)?;
+    let mut replays = replay::replay_speeds((1_000_000, pushes::side_of(1_000_000)), count, repeats)?;
     replays.extend(replay::replay_speeds((1_000_000, touchup_sim::wavy::SIDE), count, repeats)?);
     let law = |time: fn(&SizeCost) -> &PerSample| {
         let known = sizes.iter().filter(|size| size.faces <= LAW_UP_TO);

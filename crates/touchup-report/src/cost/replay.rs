@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::error::CostError;
-use super::sizes::{BAREST, refiner_of, touched_plate};
+use super::pushes::{BAREST, refiner_of, touched_plate};
 use super::turns::spread;
+use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
 use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
 use touchup_io::recording::{Topics, write_recording};
@@ -30,12 +30,8 @@ pub struct ReplaySpeed {
 }
 
 /// Writes the recording of a slide and replays it, reading alone and through each scene.
-pub(super) fn replay_speeds(
-    (faces, side): (usize, f64),
-    count: usize,
-    repeats: usize,
-) -> Result<Vec<ReplaySpeed>, CostError> {
-    let folder = tempfile::tempdir().map_err(CostError::Folder)?;
+pub(super) fn replay_speeds((faces, side): (usize, f64), count: usize, repeats: usize) -> Measured<Vec<ReplaySpeed>> {
+    let folder = tempfile::tempdir().map_err(MeasureError::Folder)?;
     let path = folder.path().join("slide.mcap");
     let (mesh, samples) = touched_plate(faces, side, count)?;
     let topics = Topics::default();
@@ -48,10 +44,10 @@ pub(super) fn replay_speeds(
     let built = scenes.iter().map(|(_, scene)| of(scene)).collect::<Result<Vec<_>, _>>()?;
     let mut rates = vec![Vec::new(); built.len() + 1];
     for _ in 0..repeats {
-        rates[0].push(rate(|| replay(&path, &topics, SyncParams::default(), |_| Ok(())))?);
+        rates[0].push(replay(&path, &topics, SyncParams::default(), |_| Ok(()))?);
         for ((sync, refiner), rates) in built.iter().zip(&mut rates[1..]) {
             let mut refiner = refiner.clone();
-            rates.push(rate(|| replay(&path, &topics, *sync, |sample| Ok(refiner.push(sample).map(drop)?)))?);
+            rates.push(replay(&path, &topics, *sync, |sample| Ok(refiner.push(sample).map(drop)?))?);
         }
     }
     let names = [READING].into_iter().chain(scenes.iter().map(|(name, _)| *name));
@@ -73,26 +69,22 @@ pub(super) fn messages(sample: &Sample) -> [Message; 2] {
     [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
 }
 
-/// Samples per second of work that reports how many it did.
-fn rate(work: impl FnOnce() -> Result<usize, CostError>) -> Result<f64, CostError> {
-    let (seconds, count) = timed(work);
-    Ok(count? as f64 / seconds)
-}
-
-/// Reads and pairs all, and gives each sample to `push`; returns how many there were.
+/// Reads and pairs all, and gives each sample to `push`; returns how many there were in a second.
 fn replay(
     path: &Path,
     topics: &Topics,
     sync: SyncParams,
-    mut push: impl FnMut(&Sample) -> Result<(), CostError>,
-) -> Result<usize, CostError> {
-    let recording = Recording::open(path, topics).map_err(ReplayError::from)?;
+    mut push: impl FnMut(&Sample) -> Measured<()>,
+) -> Measured<f64> {
     let (mut count, mut outcome) = (0, Ok(()));
-    each_sample(recording, None, sync, None, &mut || {}, |sample| {
-        count += 1;
-        if outcome.is_ok() {
-            outcome = push(sample);
-        }
-    })?;
-    outcome.map(|()| count)
+    let (seconds, replayed) = timed(|| {
+        each_sample(Recording::open(path, topics)?, None, sync, None, &mut || {}, |sample| {
+            count += 1;
+            if outcome.is_ok() {
+                outcome = push(sample);
+            }
+        })
+    });
+    replayed?;
+    outcome.map(|()| f64::from(count) / seconds)
 }

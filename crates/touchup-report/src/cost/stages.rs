@@ -5,10 +5,10 @@ use std::io::Cursor;
 
 use nalgebra::{Point3, Vector3};
 
-use super::error::CostError;
+use super::pushes::{side_of, touched_plate};
 use super::replay::messages;
-use super::sizes::{side_of, touched_plate};
 use super::turns::{PerSample, TimedCase, Timing, in_turns, spread};
+use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
 use touchup_core::features::detect;
 use touchup_core::haptic::{FaceDynamics, FaceState, RefineError};
@@ -55,18 +55,18 @@ fn touching(sample: &Sample) -> Point3<f64> {
 }
 
 /// The contact state of each sample.
-fn contacts_of(samples: &[Sample], tip: TipParams) -> Result<Vec<ContactSample>, CostError> {
+fn contacts_of(samples: &[Sample], tip: TipParams) -> Measured<Vec<ContactSample>> {
     let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip))?;
     let observe = |sample| Ok(*estimator.observe(sample).map_err(RefineError::from)?);
     samples.iter().map(observe).collect()
 }
 
 /// Times every stage that can be called by itself, on a scan of edges of 1 mm.
-pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>, CostError> {
+pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);
     let scene = Scene::default();
-    let params = scene.refine_params(WrenchFrame::Sensor).ok_or(CostError::NothingMoves)?;
+    let params = scene.refine_params(WrenchFrame::Sensor).ok_or(MeasureError::NothingMoves)?;
 
     let plain = Compensator::new(params.compensator)?;
     let tips: Vec<Tip> = samples.iter().map(|sample| plain.compensate(sample)).collect();
@@ -79,7 +79,7 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
     let dynamics = FaceDynamics::new(params.dynamics).map_err(RefineError::from)?;
     let writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default());
     let mut writer = writer.map_err(ReplayError::from)?;
-    let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
+    let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
     let (mut last, mut nearby) = (None, Nearby::default());
     let mut moving = Moving { mesh: mesh.clone(), tree: tree.clone(), plan: RefitPlan::default(), at: None };
     let face = FaceState { b: Point3::origin(), n: Vector3::z() };
@@ -89,37 +89,39 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Result<Vec<StageCost>
             for message in messages(sample) {
                 sync.push(message);
             }
-            sync.next_sample()
+            Ok(sync.next_sample())
         }),
-        TimedCase::each("compensation (nothing to take off)", &samples, |sample| plain.compensate(black_box(sample))),
-        TimedCase::each("bias tracking", &tips, |tip| bias.compensate(tip)),
-        TimedCase::each("contact gate", &tips, |tip| gate.update(tip.stamp_ns, &tip.force_o)),
+        TimedCase::each("compensation (nothing to take off)", &samples, |sample| {
+            Ok(plain.compensate(black_box(sample)))
+        }),
+        TimedCase::each("bias tracking", &tips, |tip| Ok(bias.compensate(tip))),
+        TimedCase::each("contact gate", &tips, |tip| Ok(gate.update(tip.stamp_ns, &tip.force_o))),
         TimedCase::each("sliding and friction", &tips, |tip| {
             let ball = motion.update(tip, 1e-3, 0.03);
-            motion.surface_normal(&ball, 1e-3)
+            Ok(motion.surface_normal(&ball, 1e-3))
         }),
-        TimedCase::each("closest face, from the root", &points, |p| tree.closest(&mesh, p, RADIUS)),
+        TimedCase::each("closest face, from the root", &points, |p| Ok(tree.closest(&mesh, p, RADIUS))),
         TimedCase::each("closest face, from the last one", &points, |p| {
             let hit = match last {
                 Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
                 None => tree.closest(&mesh, p, RADIUS),
             };
             last = hit.map(|hit| hit.face).or(last);
-        }),
-        TimedCase::new("face dynamics", |block| {
-            for sample in &samples[block] {
-                let p = Point3::new(0.0, 0.0, -0.05e-3);
-                black_box(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3))
-                    .map_err(RefineError::from)?;
-            }
             Ok(())
         }),
-        TimedCase::each("tree update around one face", &points, |p| moving.follow(p)),
-        TimedCase::new("recording (on a thread of its own)", |block| {
-            let mut written = samples[block].iter().flat_map(messages).map(|message| writer.write(message, "object"));
+        TimedCase::each("face dynamics", &samples, |sample| {
+            let p = Point3::new(0.0, 0.0, -0.05e-3);
+            Ok(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3).map_err(RefineError::from)?)
+        }),
+        TimedCase::each("tree update around one face", &points, |p| Ok(moving.follow(p))),
+        TimedCase::each("recording (on a thread of its own)", &samples, |sample| {
+            let mut written = messages(sample).into_iter().map(|message| writer.write(message, "object"));
             Ok(written.try_for_each(|one| one).map_err(ReplayError::from)?)
         }),
-        TimedCase::each("patch: touches found and kept", &contacts, |contact| patcher.push(contact)),
+        TimedCase::each("patch: touches found and kept", &contacts, |contact| {
+            patcher.push(contact);
+            Ok(())
+        }),
     ];
     let timed = in_turns(&mut cases, timing)?;
     let faces = mesh.face_count();
@@ -139,9 +141,9 @@ struct Moving {
 }
 
 impl Moving {
-    /// Brings the boxes around the face under the tip up to date. Which face that is, and which boxes, is looked up
+    /// Brings the boxes around the face under the tip up to date, and returns that. Which face that is, and which boxes, is looked up
     /// once for a millimetre of travel, as the refiner does it once for each face.
-    fn follow(&mut self, p: &Point3<f64>) {
+    fn follow(&mut self, p: &Point3<f64>) -> Option<FaceId> {
         let Self { mesh, tree, plan, at } = self;
         let is_far = at.is_none_or(|face| (mesh.barycentre(face) - p).norm_squared() > 1e-6);
         if is_far {
@@ -151,16 +153,17 @@ impl Moving {
             tree.plan(&faces, plan);
         }
         tree.refit_planned(mesh, plan, f64::INFINITY, 0.0);
+        *at
     }
 }
 
 /// Times the work that is not done at each sample.
-pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Result<Vec<SeldomCost>, CostError> {
+pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), 1000 + RENEWAL * repeats)?;
     let tree = FaceTree::new(&mesh);
     let faces = mesh.face_count();
     let scene = Scene::default();
-    let mut patcher = Patcher::new(scene.patcher_params().ok_or(CostError::NothingMoves)?)?;
+    let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
     let contacts = contacts_of(&samples, scene.tip_params())?;
     let mut renew = |contacts: &[ContactSample]| {
         contacts.iter().for_each(|contact| patcher.push(contact));

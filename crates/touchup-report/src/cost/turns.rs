@@ -4,29 +4,24 @@ use std::hint::black_box;
 use std::ops::Range;
 use std::time::Instant;
 
-use super::error::CostError;
 use crate::Spread;
 use crate::allocations::asked;
+use crate::error::{MeasureError, Measured};
 
 /// One case: does the work of these samples, by number.
 pub(super) struct TimedCase<'a> {
     pub name: &'a str,
-    pub run: Box<dyn FnMut(Range<usize>) -> Result<(), CostError> + 'a>,
+    pub run: Box<dyn FnMut(Range<usize>) -> Measured<()> + 'a>,
 }
 
 impl<'a> TimedCase<'a> {
-    pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Result<(), CostError> + 'a) -> Self {
+    pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Measured<()> + 'a) -> Self {
         Self { name, run: Box::new(run) }
     }
 
     /// Does the same with each of `items`, of which every sample has one.
-    pub fn each<T, R>(name: &'a str, items: &'a [T], mut work: impl FnMut(&'a T) -> R + 'a) -> Self {
-        Self::new(name, move |block| {
-            for item in &items[block] {
-                black_box(work(item));
-            }
-            Ok(())
-        })
+    pub fn each<T, R>(name: &'a str, items: &'a [T], mut work: impl FnMut(&'a T) -> Measured<R> + 'a) -> Self {
+        Self::new(name, move |block| items[block].iter().try_for_each(|item| work(item).map(black_box).map(drop)))
     }
 }
 
@@ -68,7 +63,7 @@ pub(super) struct Timed {
 }
 
 impl Timed {
-    fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> Result<(), CostError> {
+    fn add(&mut self, case: &mut TimedCase, samples: Range<usize>) -> Measured<()> {
         let count = samples.len();
         let before = asked();
         let started = Instant::now();
@@ -84,7 +79,7 @@ impl Timed {
         Ok(())
     }
 
-    pub fn per_sample(&self) -> Result<PerSample, CostError> {
+    pub fn per_sample(&self) -> Measured<PerSample> {
         let share = |count: u64| self.counts.then(|| count as f64 / self.samples.max(1) as f64);
         Ok(PerSample {
             time_ns: spread(self.blocks_ns.iter().copied())?,
@@ -95,7 +90,7 @@ impl Timed {
 }
 
 /// Runs all cases over the same samples: first to warm up, then block by block, another one first each time.
-pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Result<Vec<Timed>, CostError> {
+pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<Timed>> {
     let counts = asked().is_some();
     let mut timed: Vec<_> = cases.iter().map(|_| Timed { counts, ..Timed::default() }).collect();
     for case in cases.iter_mut() {
@@ -112,13 +107,13 @@ pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Result<Vec<Ti
 }
 
 /// Block by block, the first compared with the second: their ratio, or their difference in ns.
-pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Result<Spread, CostError> {
+pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Measured<Spread> {
     spread(of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| compare(*of, *to)))
 }
 
 /// Of what was timed.
-pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> Result<Spread, CostError> {
-    Spread::of(times.into_iter().collect()).ok_or(CostError::NothingTimed)
+pub(super) fn spread(times: impl IntoIterator<Item = f64>) -> Measured<Spread> {
+    Spread::of(times.into_iter().collect()).ok_or(MeasureError::NothingTimed)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 /// One extreme.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Extreme {
     /// the input
     pub fed: String,
@@ -18,9 +18,22 @@ pub struct Extreme {
 /// The outcome in words, and whether it is right; an error where none would be.
 pub(super) type CaseOutcome<E> = Result<(String, bool), E>;
 
-pub(super) fn extreme<E: Display>(fed: &str, right_answer: &str, outcome: CaseOutcome<E>) -> Extreme {
-    let (came_out, is_right) = outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
-    Extreme { fed: fed.to_owned(), came_out, right_answer: right_answer.to_owned(), is_right }
+impl Extreme {
+    /// Begins one with what is fed.
+    pub(super) fn fed(fed: &str) -> Self {
+        Self { fed: fed.to_owned(), ..Self::default() }
+    }
+
+    /// The right answer, and why.
+    pub(super) fn should(self, right_answer: &str) -> Self {
+        Self { right_answer: right_answer.to_owned(), ..self }
+    }
+
+    /// What came out.
+    pub(super) fn gave<E: Display>(self, outcome: CaseOutcome<E>) -> Self {
+        let (came_out, is_right) = outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
+        Self { came_out, is_right, ..self }
+    }
 }
 
 /// What should be refused with a certain error.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::case::{CaseOutcome, Extreme, extreme, refused};
+use super::case::{CaseOutcome, Extreme, refused};
 use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{MeshError, TriMesh};
 use touchup_core::stylus::{Sample, SampleError, Wrench};
@@ -62,83 +62,75 @@ fn over(z: f64) -> Point3<f64> {
     Point3::new(PLACE[0], PLACE[1], z)
 }
 
-/// All finite, and no face turned over.
-fn is_sound(mesh: &TriMesh) -> bool {
-    mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite()))
-        && mesh.faces().all(|(face, _)| mesh.normal(face).z >= 0.0)
+/// Presses for one second where the true surface is `depth` below the scan: how far down the surface is then, m, and whether
+/// the mesh is sound (all finite, no face turned over) and down to it within a fifth of the depth.
+fn press(refiner: &mut Refiner, point: Point3<f64>, radius: f64, depth: f64) -> Result<(f64, bool), RefineError> {
+    for tick in 1..=1000 {
+        refiner.push(&sample(tick, point, radius, down()))?;
+    }
+    let mesh = refiner.mesh();
+    let is_sound = mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite()))
+        && mesh.faces().all(|(face, _)| mesh.normal(face).z >= 0.0);
+    let hit = refiner.closest_face(&Point3::new(point.x, point.y, 0.0), 1.0);
+    let found = hit.map_or(f64::NAN, |hit| -hit.point.z);
+    Ok((found, is_sound && (found - depth).abs() < 0.2 * depth))
 }
 
-/// The depth of the surface under (x, y), m.
-fn depth_at(refiner: &Refiner, [x, y]: [f64; 2]) -> f64 {
-    refiner.closest_face(&Point3::new(x, y, 0.0), 1.0).map_or(f64::NAN, |hit| -hit.point.z)
-}
-
-/// Presses at a place for one second, the true surface [`DEPTH`] below the scan: sound, and down to it within a fifth of the
-/// depth.
+/// Presses at a place, the true surface [`DEPTH`] below the scan.
 fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
     let mut refiner = refiner(shape)?;
-    for tick in 1..=1000 {
-        refiner.push(&sample(tick, Point3::new(x, y, -DEPTH), RADIUS, down()))?;
-    }
-    let depth = depth_at(&refiner, [x, y]);
-    let words = format!("surface {:.1} um down, {} updates cut back", 1e6 * depth, refiner.counts().cut_back);
-    Ok((words, is_sound(refiner.mesh()) && (depth - DEPTH).abs() < 0.2 * DEPTH))
+    let (depth, is_right) = press(&mut refiner, Point3::new(x, y, -DEPTH), RADIUS, DEPTH)?;
+    Ok((format!("surface {:.1} um down, {} updates cut back", 1e6 * depth, refiner.counts().cut_back), is_right))
 }
 
-/// One refused sample after a good one leaves every bit of the mesh.
-fn unchanged([good, bad]: [Sample; 2], is_right: impl Fn(&RefineError) -> bool) -> Outcome {
-    let mut refiner = refiner(plain())?;
-    refiner.push(&good)?;
+/// A refused sample leaves every bit of the mesh.
+fn unchanged(mut refiner: Refiner, bad: &Sample, is_right: impl Fn(&RefineError) -> bool) -> Outcome {
     let before = refiner.mesh().positions().to_vec();
-    let pushed = refiner.push(&bad).map(drop);
+    let pushed = refiner.push(bad).map(drop);
     refused(pushed, |error| is_right(error) && refiner.mesh().positions() == before)
 }
 
+fn is_absurd(error: &RefineError) -> bool {
+    matches!(error, RefineError::Sample(SampleError::Absurd { .. }))
+}
+
 pub(super) fn rows() -> Vec<Extreme> {
-    [samples(), shapes(), sizes()].concat()
+    [samples(), shapes_and_sizes()].concat()
 }
 
 fn samples() -> Vec<Extreme> {
-    let good = sample(5, over(-DEPTH), RADIUS, down());
-    let with = |change: fn(&mut Sample)| {
+    // after a good one
+    let bad = |change: fn(&mut Sample), is_right: fn(&RefineError) -> bool| -> Outcome {
+        let good = sample(5, over(-DEPTH), RADIUS, down());
         let mut bad = Sample { stamp_ns: 6 * MILLISECOND_NS, ..good };
         change(&mut bad);
-        [good, bad]
+        let mut refiner = refiner(plain())?;
+        refiner.push(&good)?;
+        unchanged(refiner, &bad, is_right)
     };
-    let nan = with(|bad| bad.wrench.force.y = f64::NAN);
-    let infinite = with(|bad| bad.pose_ot.translation.vector.x = f64::INFINITY);
-    let huge = with(|bad| bad.wrench.force.z = 1e7);
-    let backward = with(|bad| bad.stamp_ns = 4 * MILLISECOND_NS);
     let is_not_finite = |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotFinite { .. }));
+    let is_late = |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }));
     let kept = "a refusal that names it, and not one bit of the mesh changed";
     vec![
-        extreme("a sample with a NaN", kept, unchanged(nan, is_not_finite)),
-        extreme("a sample at infinity", kept, unchanged(infinite, is_not_finite)),
-        extreme(
-            "a sample of 1e7 N",
-            "a refusal, and not one bit changed: no sensor measures that, a unit is wrong",
-            unchanged(huge, |error| matches!(error, RefineError::Sample(SampleError::Absurd { .. }))),
-        ),
-        extreme(
-            "a sample older than the last",
-            "a refusal, and not one bit changed: what happened in between is done",
-            unchanged(backward, |error| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }))),
-        ),
-        extreme(
-            "no force 1 mm above the mesh for 1 s",
-            "not one bit changed: a stylus that hovers touches nothing",
-            unmoved(Vector3::zeros()),
-        ),
-        extreme(
-            "2 N against the normal for 1 s",
-            "not one bit changed: the contact is on another surface, or a fault",
-            unmoved(-down()),
-        ),
-        extreme(
-            "10 s without a sample, then one",
-            "the step of a held sample ends after 30 ms: what happened in the pause is not known",
-            paused(),
-        ),
+        Extreme::fed("a sample with a NaN").should(kept).gave(bad(|bad| bad.wrench.force.y = f64::NAN, is_not_finite)),
+        Extreme::fed("a sample at infinity")
+            .should(kept)
+            .gave(bad(|bad| bad.pose_ot.translation.vector.x = f64::INFINITY, is_not_finite)),
+        Extreme::fed("a sample of 1e7 N")
+            .should("a refusal, and not one bit changed: no sensor measures that, a unit is wrong")
+            .gave(bad(|bad| bad.wrench.force.z = 1e7, is_absurd)),
+        Extreme::fed("a sample older than the last")
+            .should("a refusal, and not one bit changed: what happened in between is done")
+            .gave(bad(|bad| bad.stamp_ns = 4 * MILLISECOND_NS, is_late)),
+        Extreme::fed("no force 1 mm above the mesh for 1 s")
+            .should("not one bit changed: a stylus that hovers touches nothing")
+            .gave(unmoved(Vector3::zeros())),
+        Extreme::fed("2 N against the normal for 1 s")
+            .should("not one bit changed: the contact is on another surface, or a fault")
+            .gave(unmoved(-down())),
+        Extreme::fed("10 s without a sample, then one")
+            .should("the step of a held sample ends after 30 ms: what happened in the pause is not known")
+            .gave(paused()),
     ]
 }
 
@@ -166,7 +158,7 @@ fn paused() -> Outcome {
     Ok((format!("{off:.1e} m from what a pause of 30 ms does"), off <= 1e-9))
 }
 
-fn shapes() -> Vec<Extreme> {
+fn shapes_and_sizes() -> Vec<Extreme> {
     let (positions, faces) = plain();
     // one vertex more, and a face of it with two others
     let with = |corner: Point3<f64>, [a, b]: [u32; 2]| {
@@ -181,81 +173,53 @@ fn shapes() -> Vec<Extreme> {
     let mut bad = positions.clone();
     bad[3].y = f64::NAN;
     vec![
-        extreme(
-            "a face without area among good ones",
-            "the mesh comes down to the true surface and stays sound: such a face has no say",
-            pressed(flat, PLACE),
-        ),
-        extreme(
-            "a press at a corner of an open mesh",
-            "down to the true surface, sound: a border is no wall",
-            pressed(plain(), corner),
-        ),
-        extreme(
-            "an edge of three faces",
-            "down to the true surface, sound: scans have such edges",
-            pressed(fin, PLACE),
-        ),
-        extreme(
-            "every face twice",
-            "down to the true surface, sound: both copies share their corners",
-            pressed(doubled, PLACE),
-        ),
-        extreme(
-            "a vertex that is NaN",
-            "a refusal that names the vertex",
-            refused(TriMesh::new(bad, faces), |error| *error == MeshError::NotFinite { vertex: 3 }),
-        ),
-        extreme(
-            "a mesh without faces",
-            "a refusal: there is nothing to touch",
-            refused(refiner((positions, vec![])), |error| *error == RefineError::Mesh(MeshError::Empty)),
-        ),
-    ]
-}
-
-fn sizes() -> Vec<Extreme> {
-    vec![
-        extreme(
-            "a mesh 1e6 m from the origin",
-            "a refusal of the sample that says so, or a mesh refined as at the origin: never a mesh quietly off by roundings",
-            far_away(),
-        ),
-        extreme(
-            "a mesh 1e-6 m large under a ball of 1e-7 m",
-            "down to the true surface, sound: only ratios of lengths count",
-            tiny(),
-        ),
+        Extreme::fed("a face without area among good ones")
+            .should("the mesh comes down to the true surface and stays sound: such a face has no say")
+            .gave(pressed(flat, PLACE)),
+        Extreme::fed("a press at a corner of an open mesh")
+            .should("down to the true surface, sound: a border is no wall")
+            .gave(pressed(plain(), corner)),
+        Extreme::fed("an edge of three faces")
+            .should("down to the true surface, sound: scans have such edges")
+            .gave(pressed(fin, PLACE)),
+        Extreme::fed("every face twice")
+            .should("down to the true surface, sound: both copies share their corners")
+            .gave(pressed(doubled, PLACE)),
+        Extreme::fed("a vertex that is NaN")
+            .should("a refusal that names the vertex")
+            .gave(refused(TriMesh::new(bad, faces), |error| *error == MeshError::NotFinite { vertex: 3 })),
+        Extreme::fed("a mesh without faces")
+            .should("a refusal: there is nothing to touch")
+            .gave(refused(refiner((positions, vec![])), |error| *error == RefineError::Mesh(MeshError::Empty))),
+        Extreme::fed("a mesh 1e6 m from the origin")
+            .should(
+                "a refusal of the sample that says so, or a mesh refined as at the origin: never a mesh quietly \
+                 off by roundings",
+            )
+            .gave(far_away()),
+        Extreme::fed("a mesh 1e-6 m large under a ball of 1e-7 m")
+            .should("down to the true surface, sound: only ratios of lengths count")
+            .gave(tiny()),
     ]
 }
 
 fn far_away() -> Outcome {
     let centre = Vector3::new(1e6, 0.0, 0.0);
-    let mut refiner = match refiner(square(EDGE, &centre)) {
-        Ok(refiner) => refiner,
-        error => return refused(error, |_| true),
-    };
-    let before = refiner.mesh().positions().to_vec();
-    let pushed = refiner.push(&sample(1, over(-DEPTH) + centre, RADIUS, down())).map(drop);
-    refused(pushed, |error| {
-        let is_named = matches!(error, RefineError::Sample(SampleError::Absurd { .. }));
-        is_named && refiner.mesh().positions() == before
-    })
+    match refiner(square(EDGE, &centre)) {
+        Ok(refiner) => unchanged(refiner, &sample(1, over(-DEPTH) + centre, RADIUS, down()), is_absurd),
+        error => refused(error, |_| true),
+    }
 }
 
 fn tiny() -> Outcome {
-    let (edge, radius, depth, place) = (2e-7, 1e-7, 5e-9, [3e-8, 1e-8]);
+    let (edge, radius, depth) = (2e-7, 1e-7, 5e-9);
     // a probe so stiff that it does not bend by more than such a mesh is large
     let stiffness = 2e9;
     let params = RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) });
     let (positions, faces) = square(edge, &Vector3::zeros());
     let mut refiner = Refiner::new(TriMesh::new(positions, faces)?, params)?;
-    for tick in 1..=1000 {
-        let point = Point3::new(place[0], place[1], -depth) + down() / STIFFNESS - down() / stiffness;
-        refiner.push(&sample(tick, point, radius, down()))?;
-    }
-    let found = depth_at(&refiner, place);
+    let point = Point3::new(3e-8, 1e-8, -depth) + down() / STIFFNESS - down() / stiffness;
+    let (found, is_right) = press(&mut refiner, point, radius, depth)?;
     let (nm, of_nm, cut_back) = (1e9 * found, 1e9 * depth, refiner.counts().cut_back);
-    let words = format!("surface {nm:.2} nm down of {of_nm:.2} nm, {cut_back} updates cut back");
-    Ok((words, is_sound(refiner.mesh()) && (found - depth).abs() < 0.2 * depth))
+    Ok((format!("surface {nm:.2} nm down of {of_nm:.2} nm, {cut_back} updates cut back"), is_right))
 }

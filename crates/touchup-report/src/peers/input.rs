@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::TouchupTimes;
+use super::PeerTimes;
 use crate::{Effort, Spread, timed};
 use touchup_core::haptic::{RefineError, RefineParams, Refiner, TipParams};
 use touchup_core::mesh::{FaceTree, MeshError, Nearby, TriMesh};
@@ -51,9 +51,11 @@ impl PeersInput {
 
     /// Measures touchup: each query and each push by itself.
     ///
+    /// - `turn`: "before" the peers or "after" them.
+    ///
     /// # Errors
     /// Those of [`Refiner::new`] and [`Refiner::push`]: none is expected.
-    pub fn measure(&self) -> Result<TouchupTimes, RefineError> {
+    pub fn measure(&self, turn: &str) -> Result<PeerTimes, RefineError> {
         let tree = FaceTree::new(&self.mesh);
         let (mut queries, mut next) = (Vec::new(), Vec::new());
         let (mut last, mut nearby) = (None, Nearby::default());
@@ -78,7 +80,14 @@ impl PeersInput {
             }
         }
         let spread = |times| Spread::of(times).unwrap_or(f64::NAN.into());
-        Ok(TouchupTimes { query_us: spread(queries), next_query_us: spread(next), push_us: spread(pushes) })
+        Ok(PeerTimes {
+            peer: format!("touchup, {turn}"),
+            update: "boxes of the moved faces refitted".to_owned(),
+            query_us: spread(queries),
+            batched_query_us: Some(spread(next)),
+            pipeline_us: spread(pushes),
+            ..PeerTimes::default()
+        })
     }
 }
 

@@ -30,31 +30,21 @@ pub const WANTED_FACTOR: f64 = 100.0;
 /// A distance that differs by more than this share is another answer.
 pub const AGREEMENT: f64 = 1e-9;
 
-/// Times of touchup itself on the same input, µs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TouchupTimes {
-    /// one closest face, without a starting face
-    pub query_us: Spread,
-    /// one closest face, near the last
-    pub next_query_us: Spread,
-    /// a whole push: filter, gate, closest face, dynamics, deformation, guard, tree
-    pub push_us: Spread,
-}
-
-/// One peer as the script reports it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// One peer as the script reports it, or touchup itself.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct PeerTimes {
     /// which
     pub peer: String,
-    /// of what it is made of
+    /// of what it is made of; of touchup nothing
     pub versions: String,
     /// how its index is kept true
     pub update: String,
     /// one closest face per call, µs
     pub query_us: Spread,
-    /// the same in one call for all, µs for each; where it can
+    /// the same in one call for all, µs for each; where it can. Of touchup one near the last
     pub batched_query_us: Option<Spread>,
-    /// closest face, ring moved, index true again, µs
+    /// closest face, ring moved, index true again, µs. Of touchup a whole push: filter, gate, closest face, dynamics,
+    /// deformation, guard, tree
     pub pipeline_us: Spread,
     /// distances, m; none where it has no closest-face query
     distances_m: Vec<Option<f64>>,
@@ -78,7 +68,7 @@ pub struct PeersAtSize {
     /// of the mesh
     pub faces: usize,
     /// touchup before the peers and after them
-    pub touchup: [TouchupTimes; 2],
+    pub touchup: [PeerTimes; 2],
     /// as measured
     pub peers: Vec<PeerTimes>,
     /// those that were not
@@ -114,24 +104,24 @@ impl PeersAtSize {
     ///
     /// # Errors
     /// [`UnknownLine`]
-    pub fn read(input: &PeersInput, touchup: [TouchupTimes; 2], printed: &str) -> Result<Self, UnknownLine> {
-        let mut all = Self { faces: input.mesh.face_count(), touchup, peers: vec![], failed: vec![] };
+    pub fn read(input: &PeersInput, touchup: [PeerTimes; 2], printed: &str) -> Result<Self, UnknownLine> {
+        let (mut peers, mut failed) = (Vec::new(), Vec::new());
         for line in printed.lines().filter(|line| !line.trim().is_empty()) {
-            if let Ok(failed) = serde_json::from_str(line) {
-                all.failed.push(failed);
+            if let Ok(failure) = serde_json::from_str(line) {
+                failed.push(failure);
                 continue;
             }
             let read = serde_json::from_str::<PeerTimes>(line);
-            let mut times = read.map_err(|error| UnknownLine { line: line.chars().take(200).collect(), error })?;
-            times.largest_difference = largest_difference(&times.distances_m, &input.distances);
-            all.peers.push(times);
+            let times = read.map_err(|error| UnknownLine { line: line.chars().take(200).collect(), error })?;
+            let largest_difference = largest_difference(&times.distances_m, &input.distances);
+            peers.push(PeerTimes { largest_difference, ..times });
         }
-        Ok(all)
+        Ok(Self { faces: input.mesh.face_count(), touchup, peers, failed })
     }
 
     /// Whole pushes, the slower of both turns, µs.
     pub fn push_us(&self) -> f64 {
-        self.touchup.iter().map(|times| times.push_us.median).fold(0.0, f64::max)
+        self.touchup.iter().map(|times| times.pipeline_us.median).fold(0.0, f64::max)
     }
 
     /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact, and so is the nearest barycentre for
@@ -191,7 +181,12 @@ mod tests {
     #[test]
     fn the_fastest_that_is_right_is_compared() {
         let input = PeersInput::new(200, Effort { is_quick: true }).unwrap();
-        let times = |push: f64| TouchupTimes { query_us: 0.5.into(), next_query_us: 0.2.into(), push_us: push.into() };
+        let times = |push: f64| PeerTimes {
+            query_us: 0.5.into(),
+            batched_query_us: Some(0.2.into()),
+            pipeline_us: push.into(),
+            ..PeerTimes::default()
+        };
         let truth = input.distances[0];
         let printed = [
             line("right", 9.0, 300.0, truth),
@@ -208,7 +203,7 @@ mod tests {
         // a picture and a table, under two names
         let Chapter { figures, tables, .. } = peers.chapter();
         assert!(figures.len() == 1 && tables.len() == 1 && figures[0].id != tables[0].id);
-        assert!(PeersAtSize::read(&input, [times(1.0); 2], "Segmentation fault").is_err());
+        assert!(PeersAtSize::read(&input, [times(1.0), times(1.0)], "Segmentation fault").is_err());
     }
 
     /// The queries lie 0.05 mm below the wavy plate along its normal, and a chord of it is off by d² κ / 8 at most: edges of

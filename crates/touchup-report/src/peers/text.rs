@@ -11,7 +11,7 @@ impl Peers {
                    to date by the cheapest method that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
                    guards the mesh. Of both turns of touchup the slower counts.";
         let text = std::iter::once(how.to_owned()).chain(self.sizes.iter().flat_map(verdicts)).collect();
-        Chapter { title: "Against peers".to_owned(), text, figures: vec![figure(self)], tables: vec![table(self)] }
+        Chapter::of("Against peers", text, vec![figure(self)], vec![table(self)])
     }
 }
 
@@ -42,55 +42,27 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
     all.map(|text| format!("{} faces: {text}", size.faces)).collect()
 }
 
-/// A turn of touchup, or a peer.
-struct Row<'a> {
-    faces: usize,
-    who: String,
-    update: &'a str,
-    query_us: Spread,
-    next_query_us: Option<Spread>,
-    sample_us: Spread,
-    ratio: Option<f64>,
-    difference: TableCell,
-}
-
-fn rows(size: &PeersAtSize) -> Vec<Row<'_>> {
-    let ours = ["touchup, before", "touchup, after"].into_iter().zip(&size.touchup).map(|(name, times)| Row {
-        faces: size.faces,
-        who: name.to_owned(),
-        update: "boxes of the moved faces refitted",
-        query_us: times.query_us,
-        next_query_us: Some(times.next_query_us),
-        sample_us: times.push_us,
-        ratio: None,
-        difference: TableCell::Empty,
-    });
-    let peers = size.peers.iter().map(|peer| Row {
-        faces: size.faces,
-        who: format!("{} ({})", peer.peer, peer.versions),
-        update: &peer.update,
-        query_us: peer.query_us,
-        next_query_us: peer.batched_query_us,
-        sample_us: peer.pipeline_us,
-        ratio: Some(peer.pipeline_us.median / size.push_us()),
-        difference: peer.largest_difference.map_or("another question (Eq 12)".into(), TableCell::Number),
-    });
-    ours.chain(peers).collect()
-}
-
 fn table(peers: &Peers) -> Table {
-    let rows: Vec<Row> = peers.sizes.iter().flat_map(rows).collect();
-    let caption = "Medians with p10 to p90, one thread. A rebuild is measured over four seconds.";
-    Table::of("peers", "Closest face and whole sample against libraries from PyPI", caption, &rows)
-        .column("faces", |row| row.faces)
-        .column("who", |row| row.who.as_str())
-        .column("how the index is kept true", |row| row.update)
-        .column("closest face per call, µs", |row| row.query_us)
-        .column("closest face in one call for all (touchup: near the last), µs", |row| row.next_query_us)
-        .column("whole sample, µs", |row| row.sample_us)
-        .column("sample over touchup's push", |row| row.ratio)
-        .column("largest relative difference of a distance", |row| row.difference.clone())
-        .table
+    // with the push that a peer is compared with
+    let rows = peers.sizes.iter().flat_map(|size| {
+        let ours = size.touchup.iter().map(move |times| (size.faces, None, times));
+        ours.chain(size.peers.iter().map(move |times| (size.faces, Some(size.push_us()), times)))
+    });
+    Table::of("peers", "Closest face and whole sample against libraries from PyPI", rows)
+        .column("faces", |(faces, ..)| faces)
+        .column("who", |(_, push_us, times)| match push_us {
+            None => times.peer.clone(),
+            Some(_) => format!("{} ({})", times.peer, times.versions),
+        })
+        .column("how the index is kept true", |(.., times)| times.update.as_str())
+        .column("closest face per call, µs", |(.., times)| times.query_us)
+        .column("closest face in one call for all (touchup: near the last), µs", |(.., times)| times.batched_query_us)
+        .column("whole sample, µs", |(.., times)| times.pipeline_us)
+        .column("sample over touchup's push", |(_, push_us, times)| Some(times.pipeline_us.median / push_us?))
+        .column("largest relative difference of a distance", |(_, push_us, times)| {
+            push_us.map(|_| times.largest_difference.map_or("another question (Eq 12)".into(), TableCell::Number))
+        })
+        .caption("Medians with p10 to p90, one thread. A rebuild is measured over four seconds.")
 }
 
 fn figure(peers: &Peers) -> Figure {
@@ -103,17 +75,13 @@ fn figure(peers: &Peers) -> Figure {
         }
     };
     for size in &peers.sizes {
-        add("touchup", size.faces, size.touchup[0].push_us);
+        add("touchup", size.faces, size.touchup[0].pipeline_us);
         for peer in &size.peers {
             add(&peer.peer, size.faces, peer.pipeline_us);
         }
     }
-    Figure {
-        id: "peers_sample".to_owned(),
-        title: "Time per sample with an index that stays exact".to_owned(),
-        caption: "Medians with p10 to p90, one thread; touchup: whole push, before the peers.".to_owned(),
-        x: Axis::log("faces", "faces"),
-        y: Axis::log("time per sample, µs", "sample_us"),
-        drawing: Drawing::Curves(series),
-    }
+    Figure::of("peers_sample", Drawing::Curves(series))
+        .title("Time per sample with an index that stays exact")
+        .axes(Axis::log("faces", "faces"), Axis::log("time per sample, µs", "sample_us"))
+        .caption("Medians with p10 to p90, one thread; touchup: whole push, before the peers.")
 }

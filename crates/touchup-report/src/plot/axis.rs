@@ -69,21 +69,17 @@ impl Extent {
         let whole = (first..=last).filter(|power| (self.low..=self.high).contains(&f64::from(*power))).count();
         let ends = [self.low.ceil() as i32, self.high.floor() as i32];
         let are_written_out = whole < 2 || ends.iter().all(|end| WRITTEN_OUT.contains(end));
-        let mut ticks = Vec::new();
-        for power in first..=last {
-            for ninth in 1..=9 {
-                if ninth > 1 && decades > DECADES_WITH_NINTHS {
-                    break;
-                }
-                // with hardly a whole decade 2 and 5 need their numbers too
-                let has_label =
-                    if ninth == 1 { power.rem_euclid(every) == 0 } else { whole < 2 && [2, 5].contains(&ninth) };
-                let value = f64::from(ninth) * 10f64.powi(power);
-                let label = if are_written_out { three_digits(value) } else { power_of_ten(power) };
-                ticks.push(self.tick(value, if has_label { label } else { String::new() }));
-            }
-        }
-        ticks
+        let most = if decades > DECADES_WITH_NINTHS { 1 } else { 9 };
+        let ninths = (first..=last).flat_map(|power| (1..=most).map(move |ninth| (power, ninth)));
+        let tick = |(power, ninth): (i32, i32)| {
+            // with hardly a whole decade 2 and 5 need their numbers too
+            let has_label =
+                if ninth == 1 { power.rem_euclid(every) == 0 } else { whole < 2 && [2, 5].contains(&ninth) };
+            let value = f64::from(ninth) * 10f64.powi(power);
+            let label = if are_written_out { three_digits(value) } else { power_of_ten(power) };
+            self.tick(value, if has_label { label } else { String::new() })
+        };
+        ninths.map(tick).collect()
     }
 
     fn tick(&self, value: f64, label: String) -> Tick {

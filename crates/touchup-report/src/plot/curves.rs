@@ -34,14 +34,10 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Lo
     let hidden: usize = series.iter().map(&mut draw).sum();
     frame.draw_border(svg);
     let below = frame.bottom() + BELOW;
-    let bottom = if is_beside {
-        draw_legend(svg, (series, looks), [frame.right() + 14.0, TOP + 12.0], 1, 0.0);
-        below
-    } else {
-        let columns = (((WIDTH - LEFT) / (name_width + SAMPLE + 20.0)) as usize).max(1);
-        let lines = draw_legend(svg, (series, looks), [LEFT, below + 12.0], columns, (WIDTH - LEFT) / columns as f64);
-        below + lines as f64 * LINE
-    };
+    let columns = if is_beside { 1 } else { (((WIDTH - LEFT) / (name_width + SAMPLE + 20.0)) as usize).max(1) };
+    let corner = if is_beside { [frame.right() + 14.0, TOP + 12.0] } else { [LEFT, below + 12.0] };
+    draw_legend(svg, (series, looks), corner, columns);
+    let bottom = if is_beside { below } else { below + series.len().div_ceil(columns) as f64 * LINE };
     if hidden == 0 {
         return bottom;
     }
@@ -91,14 +87,8 @@ fn draw_bars(svg: &mut Svg, frame: &Frame, [x, y]: [&Extent; 2], look: Look, mar
     }
 }
 
-/// Returns how many lines it has.
-fn draw_legend(
-    svg: &mut Svg,
-    (series, looks): (&[Series], &Looks),
-    corner: [f64; 2],
-    columns: usize,
-    width: f64,
-) -> usize {
+fn draw_legend(svg: &mut Svg, (series, looks): (&[Series], &Looks), corner: [f64; 2], columns: usize) {
+    let width = (WIDTH - LEFT) / columns as f64;
     for (index, series) in series.iter().enumerate() {
         let look = looks.look(&series.name);
         let (column, line) = (index % columns, index / columns);
@@ -112,5 +102,4 @@ fn draw_legend(
         }
         svg.text([x + SAMPLE, y + 4.5], "start", "font-size=\"12.5\"", &series.name);
     }
-    series.len().div_ceil(columns)
 }

@@ -37,11 +37,12 @@ impl Frame {
     /// Gridlines, their numbers, and the border.
     pub fn draw_grid(&self, svg: &mut Svg, x: &Extent, y: &Extent) {
         let (xs, ys) = (x.ticks(), y.ticks());
-        for tick in &xs {
-            svg.line(self.pixel([tick.at, 0.0]), self.pixel([tick.at, 1.0]), grid(tick));
-        }
-        for tick in &ys {
-            svg.line(self.pixel([0.0, tick.at]), self.pixel([1.0, tick.at]), grid(tick));
+        let upward = xs.iter().map(|tick| (tick, [[tick.at, 0.0], [tick.at, 1.0]]));
+        for (tick, ends) in upward.chain(ys.iter().map(|tick| (tick, [[0.0, tick.at], [1.0, tick.at]]))) {
+            let [from, to] = ends.map(|end| self.pixel(end));
+            // a line without a number is fainter
+            let colour = if tick.label.is_empty() { "#efefef" } else { "#d6d6d6" };
+            svg.line(from, to, &format!("stroke=\"{colour}\""));
         }
         self.draw_x_labels(svg, &xs);
         self.draw_y_labels(svg, &ys);
@@ -79,9 +80,4 @@ impl Frame {
         svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], "middle", "", x);
         svg.upward_text([self.left - 56.0, self.top + 0.5 * self.height], y);
     }
-}
-
-/// A line without a number is fainter.
-fn grid(tick: &Tick) -> &'static str {
-    if tick.label.is_empty() { "stroke=\"#efefef\"" } else { "stroke=\"#d6d6d6\"" }
 }

@@ -21,7 +21,7 @@ const SMALL: f64 = 10.5;
 ///
 /// - `looks`: of its series.
 pub(super) fn svg(figure: &Figure, looks: &Looks, provenance: &str) -> String {
-    let mut svg = Svg::new();
+    let mut svg = Svg::default();
     svg.text([14.0, 22.0], "start", "font-size=\"15\" font-weight=\"600\"", &figure.title);
     let bottom = match &figure.drawing {
         Drawing::Curves(series) => curves::draw(&mut svg, figure, series, looks),
@@ -39,13 +39,10 @@ pub(super) fn svg(figure: &Figure, looks: &Looks, provenance: &str) -> String {
 fn lines_of(text: &str, size: f64, width: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
-        let line = lines.last().map_or("", String::as_str);
-        let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
-        if line.is_empty() || text_width(&longer, size) <= width {
-            lines.pop();
-            lines.push(longer);
-        } else {
-            lines.push(word.to_owned());
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(word),
+            Some(line) if text_width(&format!("{line} {word}"), size) <= width => *line += &format!(" {word}"),
+            _ => lines.push(word.to_owned()),
         }
     }
     lines

@@ -38,31 +38,29 @@ impl Looks {
 
     /// That of a series in one of the figures.
     pub(super) fn look(&self, name: &str) -> Look {
-        Look { index: self.0.get(name).copied().unwrap_or_default() }
+        Look(self.0.get(name).copied().unwrap_or_default())
     }
 }
 
 /// The look of a series, the same in frame and legend.
 #[derive(Clone, Copy)]
-pub(super) struct Look {
-    index: usize,
-}
+pub(super) struct Look(usize);
 
 impl Look {
     pub fn colour(self) -> &'static str {
-        COLOURS[self.index % COLOURS.len()]
+        COLOURS[self.0 % COLOURS.len()]
     }
 
     /// Attributes of the line that joins marks.
     pub fn line(self) -> String {
-        let dashes = DASHES[(self.index / 2) % DASHES.len()];
+        let dashes = DASHES[(self.0 / 2) % DASHES.len()];
         format!("stroke=\"{}\" stroke-width=\"1.6\" stroke-dasharray=\"{dashes}\"", self.colour())
             .replace(" stroke-dasharray=\"\"", "")
     }
 
     /// Attributes of a line without marks.
     pub fn dashed(self) -> String {
-        let dashes = MODEL_DASHES[self.index % MODEL_DASHES.len()];
+        let dashes = MODEL_DASHES[self.0 % MODEL_DASHES.len()];
         format!("stroke=\"{}\" stroke-width=\"1.2\" stroke-dasharray=\"{dashes}\"", self.colour())
     }
 
@@ -77,27 +75,23 @@ impl Look {
         let filled = format!("fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.6\"");
         let hollow = format!("fill=\"#fff\" stroke=\"{colour}\" stroke-width=\"1.6\"");
         let stroke = format!("stroke=\"{colour}\" stroke-width=\"1.8\"");
-        let shape = |corners: &[[f64; 2]]| -> Vec<[f64; 2]> {
-            corners.iter().map(|[dx, dy]| [x + HALF * dx, y + HALF * dy]).collect()
-        };
-        let square = [[-0.85, -0.85], [0.85, -0.85], [0.85, 0.85], [-0.85, 0.85]];
-        let up = [[0.0, -1.1], [1.05, 0.8], [-1.05, 0.8]];
-        let diamond = [[0.0, -1.2], [1.2, 0.0], [0.0, 1.2], [-1.2, 0.0]];
+        let shape =
+            |corners: &[[f64; 2]]| corners.iter().map(|[dx, dy]| [x + HALF * dx, y + HALF * dy]).collect::<Vec<_>>();
+        let square = shape(&[[-0.85, -0.85], [0.85, -0.85], [0.85, 0.85], [-0.85, 0.85]]);
+        let diamond = shape(&[[0.0, -1.2], [1.2, 0.0], [0.0, 1.2], [-1.2, 0.0]]);
         // beyond eight, where colours come again, other shapes go with them
-        match (self.index + self.index / 8) % 8 {
+        match (self.0 + self.0 / 8) % 8 {
             0 => svg.circle([x, y], HALF * 0.95, &filled),
-            1 => svg.polygon(&shape(&square), &filled),
-            2 => svg.polygon(&shape(&up), &filled),
-            3 => svg.polygon(&shape(&diamond), &filled),
+            1 => svg.polygon(&square, &filled),
+            2 => svg.polygon(&shape(&[[0.0, -1.1], [1.05, 0.8], [-1.05, 0.8]]), &filled),
+            3 => svg.polygon(&diamond, &filled),
             4 => svg.circle([x, y], HALF * 0.85, &hollow),
-            5 => svg.polygon(&shape(&square), &hollow),
+            5 => svg.polygon(&square, &hollow),
             6 => {
-                for [a, b] in [[[-0.8, -0.8], [0.8, 0.8]], [[-0.8, 0.8], [0.8, -0.8]]] {
-                    let ends = shape(&[a, b]);
-                    svg.line(ends[0], ends[1], &stroke);
-                }
+                let ends = shape(&[[-0.8, -0.8], [0.8, 0.8], [-0.8, 0.8], [0.8, -0.8]]);
+                ends.chunks(2).for_each(|ends| svg.line(ends[0], ends[1], &stroke));
             }
-            _ => svg.polygon(&shape(&diamond), &hollow),
+            _ => svg.polygon(&diamond, &hollow),
         }
     }
 }

@@ -3,15 +3,10 @@
 use std::fmt::Write;
 
 /// A picture that grows element by element.
-pub(super) struct Svg {
-    body: String,
-}
+#[derive(Default)]
+pub(super) struct Svg(String);
 
 impl Svg {
-    pub fn new() -> Self {
-        Self { body: String::new() }
-    }
-
     /// A straight line; `style`: further attributes, as they are.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], style: &str) {
         let ([x1, y1], [x2, y2]) = (from.map(number), to.map(number));
@@ -66,13 +61,13 @@ impl Svg {
              height=\"{height}\" role=\"img\" font-family=\"system-ui, 'DejaVu Sans', Arial, sans-serif\" \
              font-size=\"13\" fill=\"#222\">\n<title>{title}</title>\n<rect width=\"{width}\" height=\"{height}\" \
              fill=\"#fff\"/>\n{}</svg>\n",
-            self.body
+            self.0
         )
     }
 
     fn push(&mut self, element: std::fmt::Arguments<'_>) {
         // a string takes whatever is written into it
-        let _ = writeln!(self.body, "{element}");
+        let _ = writeln!(self.0, "{element}");
     }
 }
 

@@ -112,10 +112,6 @@ impl Double2 {
     pub fn value(self) -> f64 {
         self.high + self.low
     }
-
-    pub fn abs(self) -> Self {
-        if self.high < 0.0 { -self } else { self }
-    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::integrators::{HeldSample, Integrator};
 use touchup_core::haptic::{ContactModel, DynamicsParams};
+use touchup_core::names;
 
 /// Samples held in each run.
 const STEPS: usize = 6;
@@ -29,23 +30,25 @@ const BETA: Decades = -7.0..5.0;
 /// step length, s
 pub(super) const STEP: Decades = -9.0..3.0;
 
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunEnding {
-    /// none of those below
-    Stable,
-    /// the integrator refused or gave up
-    GaveUp,
-    /// NaN or infinite
-    NotFinite,
-    /// |n| is not 1
-    NotUnit,
-    /// the normal points backward
-    Flipped,
-    /// beyond the rest point, or the normal beyond the force
-    Overshot,
-    /// an update of the mesh was shortened or given up
-    CutBack,
+names! {
+    /// How a run ended.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum RunEnding {
+        /// none of those below
+        Stable = "stable",
+        /// the integrator refused or gave up
+        GaveUp = "gave up",
+        /// NaN or infinite
+        NotFinite = "not finite",
+        /// |n| is not 1
+        NotUnit = "not unit",
+        /// the normal points backward
+        Flipped = "flipped",
+        /// beyond the rest point, or the normal beyond the force
+        Overshot = "overshot",
+        /// an update of the mesh was shortened or given up
+        CutBack = "cut back",
+    }
 }
 
 /// One face, one held sample, one step length.
@@ -57,14 +60,6 @@ pub(super) struct FaceRun {
     pub f_max: f64,
     n: Vector3<f64>,
     pub held: HeldSample,
-}
-
-/// What [`FaceRun::judge`] saw.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct JudgedRun {
-    pub ending: RunEnding,
-    /// the integrator itself kept |n| = 1, before it was set to 1
-    pub kept_unit: bool,
 }
 
 pub(super) fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
@@ -109,14 +104,10 @@ impl FaceRun {
         Self { params, h_min, f_max, n: turn * Vector3::z(), held }
     }
 
-    /// α f_max dt / h_min: how stiff the position is.
-    pub fn position_stiffness(&self) -> f64 {
-        self.params.alpha_m_per_n_s * self.f_max * self.held.dt / self.h_min
-    }
-
-    /// β f_max² dt, or rate times dt: how stiff the normal is.
-    pub fn turning_stiffness(&self) -> f64 {
-        (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning) * self.held.dt
+    /// How stiff the position is, α f_max dt / h_min, and the normal, β f_max² dt or rate times dt.
+    pub fn stiffness(&self) -> [f64; 2] {
+        let turning = (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning) * self.held.dt;
+        [self.params.alpha_m_per_n_s * self.f_max * self.held.dt / self.h_min, turning]
     }
 
     /// Equilibrium h of the face under `n`, m.
@@ -124,11 +115,11 @@ impl FaceRun {
         if self.params.take_out_rigid_offset { 0.0 } else { self.params.model.distance(self.held.force.dot(n)) }
     }
 
-    /// Runs it. A normal whose length is off is set to 1 after each step, as anybody would do; that it was off is reported apart.
-    pub fn judge(&self, integrator: Integrator) -> JudgedRun {
+    /// How it ends, and whether the integrator itself kept |n| = 1: a normal whose length is off is set to 1 after each step, as
+    /// anybody would do.
+    pub fn judge(&self, integrator: Integrator) -> (RunEnding, bool) {
         let mut kept_unit = true;
-        let ending = self.run(integrator, &mut kept_unit);
-        JudgedRun { ending, kept_unit }
+        (self.run(integrator, &mut kept_unit), kept_unit)
     }
 
     fn run(&self, integrator: Integrator, kept_unit: &mut bool) -> RunEnding {
@@ -200,10 +191,10 @@ mod tests {
     /// Explicit Euler on dh/dt = −h/τ overshoots from dt = τ on; RK4 keeps the sign, since its polynomial has no real root.
     #[test]
     fn explicit_euler_overshoots_from_one_time_constant_on() {
-        assert_eq!(along_the_normal(0.99).judge(Integrator::ExplicitEuler).ending, RunEnding::Stable);
-        assert_eq!(along_the_normal(1.01).judge(Integrator::ExplicitEuler).ending, RunEnding::Overshot);
+        assert_eq!(along_the_normal(0.99).judge(Integrator::ExplicitEuler).0, RunEnding::Stable);
+        assert_eq!(along_the_normal(1.01).judge(Integrator::ExplicitEuler).0, RunEnding::Overshot);
         for integrator in [Integrator::Lie, Integrator::ImplicitEuler] {
-            assert_eq!(along_the_normal(1e6).judge(integrator).ending, RunEnding::Stable, "{}", integrator.name());
+            assert_eq!(along_the_normal(1e6).judge(integrator).0, RunEnding::Stable, "{}", integrator.name());
         }
     }
 

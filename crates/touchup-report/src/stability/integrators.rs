@@ -45,40 +45,35 @@ pub(super) struct HeldSample {
     pub turning: f64,
 }
 
-impl Integrator {
-    /// The end of a file name, and its counterpart in [`FaceDynamics`].
-    fn facts(self) -> (&'static str, Option<StepRule>) {
-        match self {
-            Self::ExplicitEuler => ("explicit_euler", None),
-            Self::RungeKutta4 => ("rk4", None),
-            Self::DormandPrince => ("dormand_prince", Some(StepRule::DormandPrince)),
-            Self::ImplicitEuler => ("implicit_euler", None),
-            Self::Lie => ("lie", Some(StepRule::Lie)),
-            Self::DriftCorrected => ("drift_corrected", Some(StepRule::DriftCorrected)),
-        }
-    }
+/// The travel along the force, m, and the normal, whatever its length.
+type Moved = (f64, Vector3<f64>);
+/// The same as one vector.
+type Unknowns = Vector4<f64>;
 
-    /// As the end of a file name.
-    pub fn id(self) -> &'static str {
-        self.facts().0
+impl Integrator {
+    /// As the end of a file name: the words of its name.
+    pub fn id(self) -> String {
+        let name = self.name().to_lowercase();
+        let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| word.starts_with(char::is_alphabetic));
+        words.collect::<Vec<_>>().join("_")
     }
 
     /// Its counterpart in [`FaceDynamics`], if any.
     pub fn rule(self) -> Option<StepRule> {
-        self.facts().1
+        match self {
+            Self::DormandPrince => Some(StepRule::DormandPrince),
+            Self::Lie => Some(StepRule::Lie),
+            Self::DriftCorrected => Some(StepRule::DriftCorrected),
+            Self::ExplicitEuler | Self::RungeKutta4 | Self::ImplicitEuler => None,
+        }
     }
 
-    /// The travel along the force, m, and the normal, whatever its length, after one sample; `None` where it gives up.
-    pub(super) fn step(
-        self,
-        params: &DynamicsParams,
-        n: &Vector3<f64>,
-        held: &HeldSample,
-    ) -> Option<(f64, Vector3<f64>)> {
+    /// Where the face is after one sample; `None` where it gives up.
+    pub(super) fn step(self, params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<Moved> {
         if let Some(rule) = self.rule() {
             return by_touchup(&DynamicsParams { rule, ..*params }, n, held);
         }
-        let rate = |y: &Vector4<f64>| rate(params, held, y);
+        let rate = |y: &Unknowns| rate(params, held, y);
         let start = Vector4::new(0.0, n.x, n.y, n.z);
         let end = match self {
             Self::ExplicitEuler => start + rate(&start) * held.dt,
@@ -95,7 +90,7 @@ impl Integrator {
     }
 }
 
-fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<(f64, Vector3<f64>)> {
+fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<Moved> {
     let dynamics = FaceDynamics::new(*params).ok()?;
     let face = FaceState { b: nalgebra::Point3::origin(), n: *n };
     let next = dynamics.step(&face, &held.arm.into(), &held.force, held.dt).ok()?;
@@ -104,7 +99,7 @@ fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> O
 }
 
 /// Eq 6 and 7 along the force, written independently: velocity along F (m/s) and normal (1/s).
-fn rate(params: &DynamicsParams, held: &HeldSample, y: &Vector4<f64>) -> Vector4<f64> {
+fn rate(params: &DynamicsParams, held: &HeldSample, y: &Unknowns) -> Unknowns {
     let n = Vector3::new(y[1], y[2], y[3]);
     let magnitude = held.force.norm();
     let towards = held.force / magnitude;
@@ -132,15 +127,10 @@ fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
 }
 
 /// y = y₀ + dt · rate(y) by Newton's method with a Jacobian of differences; a step that makes it worse is halved.
-fn implicit_euler(
-    start: &Vector4<f64>,
-    dt: f64,
-    length: f64,
-    rate: impl Fn(&Vector4<f64>) -> Vector4<f64>,
-) -> Option<Vector4<f64>> {
+fn implicit_euler(start: &Unknowns, dt: f64, length: f64, rate: impl Fn(&Unknowns) -> Unknowns) -> Option<Unknowns> {
     let size = Vector4::new(length, 1.0, 1.0, 1.0);
     // everything in units of its size
-    let residual = |z: &Vector4<f64>| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
+    let residual = |z: &Unknowns| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
     let mut z = start.component_div(&size);
     let mut left = residual(&z);
     for _ in 0..NEWTON_STEPS {
@@ -152,7 +142,7 @@ fn implicit_euler(
         let step = jacobian.lu().solve(&left)?;
         let mut share = 1.0;
         let mut next = z - step;
-        let is_worse = |next: &Vector4<f64>| residual(next).norm().partial_cmp(&left.norm()).is_none_or(|o| o.is_gt());
+        let is_worse = |next: &Unknowns| residual(next).norm().partial_cmp(&left.norm()).is_none_or(|o| o.is_gt());
         while share > 1e-6 && is_worse(&next) {
             share *= 0.5;
             next = z - step * share;

@@ -107,7 +107,7 @@ impl MeshRun {
         let wrench = Wrench { force, torque: Vector3::zeros() };
         let pose_ot = Isometry3::from_parts(centre.coords.into(), UnitQuaternion::identity());
         let point = centre - measured * RADIUS;
-        let mut last: Option<PressedFace> = None;
+        let mut last = None;
         for i in 1..=SAMPLES {
             let stamp_ns = (i as f64 * self.dt_s * 1e9) as i64;
             let Ok(update) = refiner.push(&Sample { stamp_ns, pose_ot, wrench }) else { return RunEnding::GaveUp };
@@ -115,36 +115,25 @@ impl MeshRun {
                 return RunEnding::CutBack;
             }
             let Some(mismatch) = update.mismatch else { continue };
-            let handle = PressedFace::of(refiner.mesh(), mismatch.face);
-            if last.is_some_and(|last| last.crosses(&handle, &point, &force)) {
+            let face = mismatch.face;
+            let now = (face, refiner.mesh().barycentre(face), refiner.mesh().normal(face));
+            if last.replace(now).is_some_and(|last| crosses(last, now, &point, &force)) {
                 return RunEnding::Overshot;
             }
-            last = Some(handle);
         }
         if refiner.counts().cut_back > 0 { RunEnding::CutBack } else { sound(refiner.mesh(), &before) }
     }
 }
 
-/// The face that is pressed, as one sample left it.
-#[derive(Clone, Copy)]
-struct PressedFace {
-    face: FaceId,
-    barycentre: Point3<f64>,
-    normal: Vector3<f64>,
-}
+/// The face that is pressed, as one sample left it: its barycentre and its normal.
+type PressedFace = (FaceId, Point3<f64>, Vector3<f64>);
 
-impl PressedFace {
-    fn of(mesh: &TriMesh, face: FaceId) -> Self {
-        Self { face, barycentre: mesh.barycentre(face), normal: mesh.normal(face) }
-    }
-
-    /// Whether the face went over its rest point to be at `next`: for the normal before and for that after.
-    fn crosses(&self, next: &Self, point: &Point3<f64>, force: &Vector3<f64>) -> bool {
-        // distance to equilibrium, m
-        let [from, to] = [self, next]
-            .map(|at| [self.normal, next.normal].map(|n| (point - at.barycentre).dot(&n) + force.dot(&n) / STIFFNESS));
-        self.face == next.face && goes_over(from, to, CROSSING)
-    }
+/// Whether the face went over its rest point from one sample to the `next`: for the normal before and for that after.
+fn crosses(last: PressedFace, next: PressedFace, point: &Point3<f64>, force: &Vector3<f64>) -> bool {
+    // distance to equilibrium, m
+    let [from, to] = [last.1, next.1]
+        .map(|barycentre| [last.2, next.2].map(|n| (point - barycentre).dot(&n) + force.dot(&n) / STIFFNESS));
+    last.0 == next.0 && goes_over(from, to, CROSSING)
 }
 
 /// Finite, with unit normals that point where they did.

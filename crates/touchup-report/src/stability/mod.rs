@@ -14,12 +14,13 @@ use rand_pcg::Pcg64;
 pub use face_runs::RunEnding;
 pub use integrators::Integrator;
 pub use mesh_runs::BadShape;
+pub use shares::EndingCounts;
 pub use sub_flows::SubFlowError;
 
 use super::{Effort, Panel};
-use face_runs::{FaceRun, JudgedRun};
+use face_runs::FaceRun;
 use mesh_runs::MeshRun;
-use shares::{count_of, share_map, stable_from, stable_up_to, tally};
+use shares::{share, share_map, stable_from, stable_up_to};
 
 /// An exact sub-flow may be off by this share of its scale.
 pub const LARGEST_SUB_FLOW_ERROR: f64 = 1e-10;
@@ -33,12 +34,8 @@ const STIFFNESS: std::ops::Range<f64> = -12.0..12.0;
 pub struct FaceShares {
     /// which
     pub integrator: Integrator,
-    /// how many runs
-    pub runs: usize,
-    /// of them, how they ended: the first fault counts
-    pub endings: Vec<(RunEnding, usize)>,
-    /// share of the stable ones
-    pub stable_share: f64,
+    /// of all runs
+    pub endings: EndingCounts,
     /// share in which the integrator itself kept |n| = 1, before it was set to 1
     pub unit_share: f64,
     /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map; `None` where not even the first is
@@ -55,12 +52,8 @@ pub struct FaceShares {
 pub struct MeshShares {
     /// of the triangles
     pub shape: BadShape,
-    /// how many runs
-    pub runs: usize,
-    /// of them, how they ended: the first fault counts
-    pub endings: Vec<(RunEnding, usize)>,
-    /// share of the stable ones
-    pub stable_share: f64,
+    /// of all runs
+    pub endings: EndingCounts,
     /// smallest altitude over longest side from which on all runs are stable, in the rows of the map; `None` where not even the
     /// last is
     pub stable_from_quality: Option<f64>,
@@ -101,22 +94,17 @@ fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
         let run = FaceRun::draw(&mut rng, i % 2 == 1);
         (run, run.judge(integrator))
     };
-    let runs: Vec<(FaceRun, JudgedRun)> = (0..count).map(run).collect();
-    let is_stable = |judged: &JudgedRun| judged.ending == RunEnding::Stable;
+    let runs: Vec<(FaceRun, (RunEnding, bool))> = (0..count).map(run).collect();
     let by_stiffness = [("sigmoid", 0), ("spring", 1)].map(|(name, first)| {
-        let stiffness = |(run, judged): &(FaceRun, JudgedRun)| {
-            (run.position_stiffness(), run.turning_stiffness(), is_stable(judged))
-        };
-        share_map(name, [&STIFFNESS; 2], runs.iter().skip(first).step_by(2).map(stiffness))
+        let of_model = runs.iter().skip(first).step_by(2);
+        let stiffness = of_model.map(|(run, (ending, _))| (run.stiffness(), *ending));
+        share_map(name, [&STIFFNESS; 2], stiffness)
     });
-    let steps = runs.iter().map(|(run, judged)| (run.held.dt, run.h_min, is_stable(judged)));
-    let endings = tally(runs.iter().map(|(_, judged)| judged.ending));
+    let steps = runs.iter().map(|(run, (ending, _))| ([run.held.dt, run.h_min], *ending));
     FaceShares {
         integrator,
-        runs: count,
-        stable_share: share(count_of(&endings, RunEnding::Stable), count),
-        endings,
-        unit_share: share(runs.iter().filter(|(_, judged)| judged.kept_unit).count(), count),
+        endings: EndingCounts::of(runs.iter().map(|(_, (ending, _))| *ending)),
+        unit_share: share(runs.iter().filter(|(_, (_, kept_unit))| *kept_unit).count(), count),
         stable_up_to: by_stiffness.iter().map(stable_up_to).reduce(|a, b| Some(a?.min(b?))).flatten(),
         by_stiffness,
         by_step: share_map(integrator.name(), [&face_runs::STEP, &face_runs::H_MIN], steps),
@@ -127,30 +115,19 @@ fn mesh_shares(shape: BadShape, count: usize) -> MeshShares {
     let mut rng = Pcg64::seed_from_u64(SEED);
     let run = |_| {
         let run = MeshRun::draw(&mut rng, shape);
-        (run.stiffness, run.quality, run.judge())
+        ([run.stiffness, run.quality], run.judge())
     };
-    let runs: Vec<(f64, f64, RunEnding)> = (0..count).map(run).collect();
-    let stable = runs.iter().map(|&(stiffness, quality, ending)| (stiffness, quality, ending == RunEnding::Stable));
-    let by_quality = share_map(shape.name(), [&(-6.0..6.0), &mesh_runs::QUALITY], stable);
-    let endings = tally(runs.iter().map(|(.., ending)| *ending));
-    MeshShares {
-        shape,
-        runs: count,
-        stable_share: share(count_of(&endings, RunEnding::Stable), count),
-        endings,
-        stable_from_quality: stable_from(&by_quality),
-        by_quality,
-    }
-}
-
-fn share(of: usize, all: usize) -> f64 {
-    of as f64 / all.max(1) as f64
+    let runs: Vec<([f64; 2], RunEnding)> = (0..count).map(run).collect();
+    let by_quality = share_map(shape.name(), [&(-6.0..6.0), &mesh_runs::QUALITY], runs.iter().copied());
+    let endings = EndingCounts::of(runs.iter().map(|(_, ending)| *ending));
+    MeshShares { shape, endings, stable_from_quality: stable_from(&by_quality), by_quality }
 }
 
 impl Stability {
     /// Whether the default integrator, Lie, was stable in every run of one face.
     pub fn is_default_stable(&self) -> bool {
-        self.faces.iter().filter(|shares| shares.integrator == Integrator::Lie).all(|shares| shares.stable_share == 1.0)
+        let mut of_default = self.faces.iter().filter(|shares| shares.integrator == Integrator::Lie);
+        of_default.all(|shares| shares.endings.stable_share() == 1.0)
     }
 
     /// The smallest altitude over longest side from which on no press of the default was at fault; `None` where all shapes are.

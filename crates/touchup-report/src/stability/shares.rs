@@ -10,25 +10,26 @@ const CELLS: usize = 12;
 
 /// Share of stable runs over two quantities between powers of ten; what lies beyond the rim counts in its cells.
 ///
-/// - `runs`: both quantities of each, and whether it was stable.
-pub(super) fn share_map(name: &str, [x, y]: [&Range<f64>; 2], runs: impl Iterator<Item = (f64, f64, bool)>) -> Panel {
+/// - `runs`: both quantities of each, and how it ended.
+pub(super) fn share_map(
+    name: &str,
+    [x, y]: [&Range<f64>; 2],
+    runs: impl Iterator<Item = ([f64; 2], RunEnding)>,
+) -> Panel {
     let at = |value: f64, range: &Range<f64>| {
         let share = (value.log10() - range.start) / (range.end - range.start);
         ((share * CELLS as f64).max(0.0) as usize).min(CELLS - 1)
     };
     let mut counts = [[0usize; 2]; CELLS * CELLS];
-    for (across, up, is_stable) in runs {
-        counts[at(up, y) * CELLS + at(across, x)][usize::from(is_stable)] += 1;
+    for ([across, up], ending) in runs {
+        counts[at(up, y) * CELLS + at(across, x)][usize::from(ending == RunEnding::Stable)] += 1;
     }
     let middles = |range: &Range<f64>| {
         let width = (range.end - range.start) / CELLS as f64;
         (0..CELLS).map(|i| 10f64.powf(range.start + (i as f64 + 0.5) * width)).collect()
     };
-    let share = |&[faulty, stable]: &[usize; 2]| {
-        let all = faulty + stable;
-        (all > 0).then(|| stable as f64 / all as f64)
-    };
-    Panel { name: name.to_owned(), xs: middles(x), ys: middles(y), shares: counts.iter().map(share).collect() }
+    let shares = counts.map(|[faulty, stable]| (faulty + stable > 0).then(|| share(stable, faulty + stable)));
+    Panel { name: name.to_owned(), xs: middles(x), ys: middles(y), shares: shares.to_vec() }
 }
 
 fn is_stable(share: &Option<f64>) -> bool {
@@ -51,22 +52,35 @@ pub(super) fn stable_from(map: &Panel) -> Option<f64> {
     Some(map.ys.iter().rev().take(stable).next_back()? / half)
 }
 
-/// How many runs ended in each way, the most frequent first.
-pub(super) fn tally(endings: impl Iterator<Item = RunEnding>) -> Vec<(RunEnding, usize)> {
-    let mut counts: Vec<(RunEnding, usize)> = Vec::new();
-    for ending in endings {
-        match counts.iter_mut().find(|(known, _)| *known == ending) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((ending, 1)),
-        }
+/// How many runs ended in each way; the first fault of a run counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EndingCounts([usize; RunEnding::ALL.len()]);
+
+impl EndingCounts {
+    pub(super) fn of(endings: impl IntoIterator<Item = RunEnding>) -> Self {
+        let mut counts = Self::default();
+        endings.into_iter().for_each(|ending| counts.0[ending as usize] += 1);
+        counts
     }
-    counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-    counts
+
+    /// How many runs there were.
+    pub fn runs(&self) -> usize {
+        self.0.iter().sum()
+    }
+
+    /// How many of them ended so.
+    pub fn count(&self, ending: RunEnding) -> usize {
+        self.0[ending as usize]
+    }
+
+    /// Share of the stable ones.
+    pub fn stable_share(&self) -> f64 {
+        share(self.count(RunEnding::Stable), self.runs())
+    }
 }
 
-/// Of the runs that were counted, how many ended so.
-pub(super) fn count_of(endings: &[(RunEnding, usize)], wanted: RunEnding) -> usize {
-    endings.iter().find(|(ending, _)| *ending == wanted).map_or(0, |(_, count)| *count)
+pub(super) fn share(of: usize, all: usize) -> f64 {
+    of as f64 / all.max(1) as f64
 }
 
 #[cfg(test)]
@@ -75,8 +89,11 @@ mod tests {
 
     #[test]
     fn runs_are_counted_in_their_cell_and_those_beyond_at_the_rim() {
-        let runs =
-            [(10f64.powf(3.5), 10f64.powf(2.5), true), (10f64.powf(3.4), 10f64.powf(2.6), false), (1e-9, 1e99, true)];
+        let runs = [
+            ([10f64.powf(3.5), 10f64.powf(2.5)], RunEnding::Stable),
+            ([10f64.powf(3.4), 10f64.powf(2.6)], RunEnding::Overshot),
+            ([1e-9, 1e99], RunEnding::Stable),
+        ];
         let map = share_map("map", [&(0.0..12.0), &(0.0..12.0)], runs.into_iter());
         assert_eq!(map.shares[2 * CELLS + 3], Some(0.5));
         assert_eq!(map.shares[11 * CELLS], Some(1.0));

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::double_double::Double2;
 use super::face_runs::log_uniform;
-use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of what is left.
 const BISECTIONS: usize = 140;
@@ -71,24 +71,24 @@ fn worst_of(name: &str, cases: usize, mut case: impl FnMut(usize) -> Option<(f64
     worst
 }
 
-fn dynamics(model: ContactModel, alpha: f64, beta: f64) -> Option<FaceDynamics> {
-    let params = DynamicsParams {
-        model,
-        alpha_m_per_n_s: alpha,
-        beta_per_n2_s: beta,
-        rule: StepRule::Lie,
-        along: Along::InitialNormal,
-        take_out_rigid_offset: false,
-    };
-    FaceDynamics::new(params).ok()
-}
-
 const FACE: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
 
-/// Travel of a face at the origin that looks up, in units of h_min.
+/// One step of a face at the origin that looks up, by the rule as printed.
+fn stepped(
+    model: ContactModel,
+    [alpha_m_per_n_s, beta_per_n2_s]: [f64; 2],
+    (tip, force): (Point3<f64>, Vector3<f64>),
+    t: f64,
+) -> Option<FaceState> {
+    let printed =
+        DynamicsParams { along: Along::InitialNormal, take_out_rigid_offset: false, ..DynamicsParams::default() };
+    let params = DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, ..printed };
+    FaceDynamics::new(params).ok()?.step(&FACE, &tip, &force, t).ok()
+}
+
+/// Travel of the face under a force along its normal, in units of h_min.
 fn travel(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
-    let after = dynamics(model, 1.0, 0.0)
-        .and_then(|dynamics| dynamics.step(&FACE, &Point3::new(0.0, 0.0, h), &(Vector3::z() * force), t).ok());
+    let after = stepped(model, [1.0, 0.0], (Point3::new(0.0, 0.0, h), Vector3::z() * force), t);
     after.map_or(f64::NAN, |face| face.b.z)
 }
 
@@ -161,7 +161,8 @@ fn primitive(u: Double2, c: f64) -> Option<Double2> {
     }
     // u − ln|1 − c − c E| / c, over 1 − c
     let inside = one - share - share * u.exp();
-    (inside.high != 0.0).then(|| (u - inside.abs().ln() / share) / (one - share))
+    let size = if inside.high < 0.0 { -inside } else { inside };
+    (inside.high != 0.0).then(|| (u - size.ln() / share) / (one - share))
 }
 
 fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
@@ -187,8 +188,7 @@ fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
         };
         let exponent = log_uniform(rng, -6.0..2.5);
         let force = Vector3::new(angle.sin(), 0.0, angle.cos());
-        let after = dynamics(UNIT_MODEL, 0.0, 1.0)
-            .and_then(|dynamics| dynamics.step(&FACE, &Point3::origin(), &force, 2.0 * exponent).ok());
+        let after = stepped(UNIT_MODEL, [0.0, 1.0], (Point3::origin(), force), 2.0 * exponent);
         let found = after.map_or(Vector3::repeat(f64::NAN), |face| face.n);
         Some(((found - exact_normal(&force, exponent)).norm(), format!("angle {angle}, exponent {exponent}")))
     })

@@ -1,13 +1,30 @@
 //! Figures and tables of whole scans.
 
 use super::{CaseResult, MethodResult, RefineMethod, ScanResult, TouchedError, WholeScan};
-use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Table};
+use crate::number::range;
+use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
 
 /// Points of a drawn law.
 const STEPS: usize = 12;
 
-fn time_axis() -> Axis {
-    Axis::log("time per sample, µs", "time_per_sample_us")
+/// What an axis shows of a method: its label, its column and the value, all on a logarithmic scale.
+type Quantity = (&'static str, &'static str, fn(&MethodResult, &TouchedError) -> Spread);
+
+const TOTAL: Quantity = ("total run time, s", "total_s", |result, _| result.total_s);
+const PER_SAMPLE: Quantity = ("time per sample, µs", "time_per_sample_us", |result, _| result.per_sample_us);
+const MEAN: Quantity = ("mean surface error, mm", "mean_error_mm", |_, error| error.mean_mm().into());
+const P95: Quantity = ("surface error p95, mm", "p95_error_mm", |_, error| error.p95_mm().into());
+const NORMAL: Quantity = ("mean normal error, deg", "normal_error_deg", |_, error| error.normal_mean_deg.into());
+
+/// Figures with a mark for each method: id, title, what is to the right and what is upward.
+const BY_METHOD: [(&str, &str, [Quantity; 2]); 3] = [
+    ("error_total", "Mean surface error against total run time", [TOTAL, MEAN]),
+    ("p95_sample", "Surface error, 95th percentile, against time per sample", [PER_SAMPLE, P95]),
+    ("normal_sample", "Mean normal error against time per sample", [PER_SAMPLE, NORMAL]),
+];
+
+fn axis((label, column, _): Quantity) -> Axis {
+    Axis::log(label, column)
 }
 
 impl WholeScan {
@@ -16,36 +33,9 @@ impl WholeScan {
     }
 
     fn figures_of(&self, case: &CaseResult) -> Vec<Figure> {
-        let mut figures = Vec::new();
-        if let Some(scan) = case.main() {
-            let mean = Axis::log("mean surface error, mm", "mean_error_mm");
-            let p95 = Axis::log("surface error p95, mm", "p95_error_mm");
-            let normal = Axis::log("mean normal error, deg", "normal_error_deg");
-            let total = Axis::log("total run time, s", "total_s");
-            let figure = |id, title, axes, of: fn(&MethodResult, &TouchedError) -> Mark| {
-                self.methods((case, scan), (id, title), axes, of)
-            };
-            figures = vec![
-                figure("error_total", "Mean surface error against total run time", [total, mean], |result, error| {
-                    Mark::at(result.total_s, error.mean_mm())
-                }),
-                figure(
-                    "p95_sample",
-                    "Surface error, 95th percentile, against time per sample",
-                    [time_axis(), p95],
-                    |result, error| Mark::at(result.per_sample_us, error.p95_mm()),
-                ),
-                figure(
-                    "normal_sample",
-                    "Mean normal error against time per sample",
-                    [time_axis(), normal],
-                    |result, error| Mark::at(result.per_sample_us, error.normal_mean_deg),
-                ),
-            ];
-        }
-        figures.extend([self.regions_and_densities(case), self.error_over_edge(case)]);
-        figures.extend(self.gaussian_cost(case));
-        figures
+        let by_method = case.main().map(|scan| BY_METHOD.map(|figure| self.by_method(case, scan, figure)));
+        let over_scans = [self.regions_and_densities(case), self.error_over_edge(case)];
+        by_method.into_iter().flatten().chain(over_scans).chain(self.gaussian_cost(case)).collect()
     }
 
     /// How the times were come by.
@@ -56,30 +46,30 @@ impl WholeScan {
         )
     }
 
-    /// One mark for each method on the main scan.
-    fn methods(
+    /// One mark for each method on the main scan, and a dashed line at the error of the scan, as wide as the marks.
+    fn by_method(
         &self,
-        (case, scan): (&CaseResult, &ScanResult),
-        (id, title): (&str, &str),
-        [x, y]: [Axis; 2],
-        of: fn(&MethodResult, &TouchedError) -> Mark,
+        case: &CaseResult,
+        scan: &ScanResult,
+        (id, title, [x, y]): (&str, &str, [Quantity; 2]),
     ) -> Figure {
+        let mark = |result: &MethodResult, error: &TouchedError| Mark::at(x.2(result, error), y.2(result, error));
         let one =
-            |result: &MethodResult| Some(Series::new(&result.name, LineStroke::Marks, [of(result, &result.error?)]));
+            |result: &MethodResult| Some(Series::new(&result.name, LineStroke::Marks, [mark(result, &result.error?)]));
         let mut series: Vec<Series> = scan.methods.iter().filter_map(one).collect();
-        series.extend(as_it_came(&series, scan, of));
-        Figure {
-            id: format!("whole_scan_{id}_{}", file_name(&case.name)),
-            title: format!("{title}, {}", case.name),
-            caption: format!(
-                "Errors where the part was touched. {} Down and to the left is better; dashed: the unrefined scan. For the \
-                 Gaussian process a sample is a touch that it keeps.",
+        let xs = range(series.iter().flat_map(|series| &series.marks).map(|mark| mark.x.median));
+        series.extend(xs.zip(scan.methods.first()).map(|((low, high), any)| {
+            let at = |x: f64| Mark::at(x, y.2(any, &scan.before));
+            Series::new("unrefined scan", LineStroke::Dashed, [low, high].map(at))
+        }));
+        Figure::of(format!("whole_scan_{id}_{}", file_name(&case.name)), Drawing::Curves(series))
+            .title(format!("{title}, {}", case.name))
+            .axes(axis(x), axis(y))
+            .caption(format!(
+                "Errors where the part was touched. {} Down and to the left is better; dashed: the unrefined scan. \
+                 For the Gaussian process a sample is a touch that it keeps.",
                 self.repeats()
-            ),
-            x,
-            y,
-            drawing: Drawing::Curves(series),
-        }
+            ))
     }
 
     /// The robust mode over the sizes of its region, and three methods over the edges of the scan.
@@ -98,35 +88,25 @@ impl WholeScan {
             let marks = scans.into_iter().filter_map(|scan| mark(scan.of(method)?));
             series.push(Series::new(name, LineStroke::Joined, marks));
         }
-        Figure {
-            id: format!("whole_scan_regions_{}", file_name(&case.name)),
-            title: format!("Mean surface error over region sizes and mesh densities, {}", case.name),
-            caption: format!("Each line in the order of its name. {}", self.repeats()),
-            x: time_axis(),
-            y: Axis::log("mean surface error, mm", "mean_error_mm"),
-            drawing: Drawing::Curves(series),
-        }
+        Figure::of(format!("whole_scan_regions_{}", file_name(&case.name)), Drawing::Curves(series))
+            .title(format!("Mean surface error over region sizes and mesh densities, {}", case.name))
+            .axes(axis(PER_SAMPLE), axis(MEAN))
+            .caption(format!("Each line in the order of its name. {}", self.repeats()))
     }
 
     fn error_over_edge(&self, case: &CaseResult) -> Figure {
-        let series = |name: String, stroke: LineStroke, of: &dyn Fn(&ScanResult) -> Option<TouchedError>| {
-            let marks = by_edge(case).into_iter().filter_map(|scan| Some(Mark::at(scan.edge_mm, of(scan)?.mean_mm())));
-            Series::new(name, stroke, marks)
-        };
-        let mut all: Vec<Series> = RefineMethod::BY_DENSITY
-            .into_iter()
-            .map(|method| series(method.name(), LineStroke::Joined, &|scan| scan.of(method)?.error))
-            .collect();
-        all.push(series("unrefined scan".to_owned(), LineStroke::Dashed, &|scan| Some(scan.before)));
-        Figure {
-            id: format!("whole_scan_density_{}", file_name(&case.name)),
-            title: format!("Mean surface error over the density of the scan, {}", case.name),
-            caption: "The same samples on scans with shorter and longer edges. The errors are the same in every run."
-                .to_owned(),
-            x: Axis::log("mean edge of the scan, mm", "edge_mm"),
-            y: Axis::log("mean surface error, mm", "mean_error_mm"),
-            drawing: Drawing::Curves(all),
-        }
+        let scans = by_edge(case);
+        let mark = |scan: &ScanResult, error: &TouchedError| Mark::at(scan.edge_mm, error.mean_mm());
+        let methods = RefineMethod::BY_DENSITY.into_iter().map(|method| {
+            let marks = scans.iter().filter_map(|scan| Some(mark(scan, &scan.of(method)?.error?)));
+            Series::new(method.name(), LineStroke::Joined, marks)
+        });
+        let before = scans.iter().map(|scan| mark(scan, &scan.before));
+        let all = methods.chain([Series::new("unrefined scan", LineStroke::Dashed, before)]).collect();
+        Figure::of(format!("whole_scan_density_{}", file_name(&case.name)), Drawing::Curves(all))
+            .title(format!("Mean surface error over the density of the scan, {}", case.name))
+            .axes(Axis::log("mean edge of the scan, mm", "edge_mm"), axis(MEAN))
+            .caption("The same samples on scans with shorter and longer edges. The errors are the same in every run.")
     }
 
     /// What a touch costs the Gaussian process, and the haptic update beside it.
@@ -149,75 +129,54 @@ impl WholeScan {
             let marks = [first, contacts].map(|n| Mark::at(n, result.per_sample_us.median));
             series.push(Series::new(method.name(), LineStroke::Dashed, marks));
         }
-        Some(Figure {
-            id: format!("whole_scan_gaussian_{}", file_name(&case.name)),
-            title: format!("Time for one more touch over the touches kept, {}", case.name),
-            caption: "Marks: medians of groups of touches in the first run, bars from p10 to p90 within the group. Dashed: \
-                      the power law through the larger half of them, up to all contacts there were, and the mean time per \
-                      sample of two other methods."
-                .to_owned(),
-            x: Axis::log("touches kept", "touches"),
-            y: Axis::log("time for one more touch, µs", "time_per_touch_us"),
-            drawing: Drawing::Curves(series),
-        })
+        Some(
+            Figure::of(format!("whole_scan_gaussian_{}", file_name(&case.name)), Drawing::Curves(series))
+                .title(format!("Time for one more touch over the touches kept, {}", case.name))
+                .axes(
+                    Axis::log("touches kept", "touches"),
+                    Axis::log("time for one more touch, µs", "time_per_touch_us"),
+                )
+                .caption(
+                    "Marks: medians of groups of touches in the first run, bars from p10 to p90 within the group. \
+                     Dashed: the power law through the larger half of them, up to all contacts there were, and the \
+                     mean time per sample of two other methods.",
+                ),
+        )
     }
 
     pub(super) fn table(&self) -> Table {
         let scans = self.cases.iter().flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
         let rows = scans.flat_map(|(case, scan)| {
             let results = scan.methods.iter().map(Some);
-            std::iter::once(None).chain(results).map(move |result| Row { case, scan, result })
+            std::iter::once(None).chain(results).map(move |result| (case, scan, result))
         });
-        Table::of(
-            "whole_scan",
-            "All methods on all scans",
-            format!(
-                "Errors where the part was touched; mean and p95 error are the worse of both directions. Time per sample \
-                 has the work after the last sample in it, shared out. Total time begins with the scan in memory. {}",
+        type Row<'a> = (&'a CaseResult, &'a ScanResult, Option<&'a MethodResult>);
+        // without a method: the scan as it came
+        let error = |(_, scan, result): Row| result.map_or(Some(scan.before), |result| result.error);
+        Table::of("whole_scan", "All methods on all scans", rows)
+            .column("part", |(case, ..)| case.name.as_str())
+            .column("edge, mm", |(_, scan, _)| scan.edge_mm)
+            .column("method", |(.., result)| result.map_or("unrefined scan", |result| &result.name))
+            .column("mean error, mm", |row| error(row).map(|error| error.mean_mm()))
+            .column("p95 error, mm", |row| error(row).map(|error| error.p95_mm()))
+            .column("part to mesh mean, mm", |row| error(row).map(|error| error.part_to_mesh_mean_mm))
+            .column("mesh to part mean, mm", |row| error(row).map(|error| error.mesh_to_part_mean_mm))
+            .column("mean normal error, deg", |row| error(row).map(|error| error.normal_mean_deg))
+            .column("p95 normal error, deg", |row| error(row).map(|error| error.normal_p95_deg))
+            .column("total, s", |(.., result)| Some(result?.total_s))
+            .column("per sample, µs", |(.., result)| Some(result?.per_sample_us))
+            .column("after the last sample, ms", |(.., result)| Some(result?.end_ms))
+            .column("samples", |(.., result)| Some(result?.samples))
+            .column("runs", |(.., result)| Some(result?.runs))
+            .column("cut back, %", |(.., result)| Some(result?.cut_back_share * 100.0))
+            .column("remark", |(.., result)| Some(result?.remarks.join("; ")).filter(|remark| !remark.is_empty()))
+            .caption(format!(
+                "Errors where the part was touched; mean and p95 error are the worse of both directions. Time per \
+                 sample has the work after the last sample in it, shared out. Total time begins with the scan in \
+                 memory. {}",
                 self.repeats()
-            ),
-            rows,
-        )
-        .column("part", |row| row.case.name.as_str())
-        .column("edge, mm", |row| row.scan.edge_mm)
-        .column("method", |row| row.result.map_or("unrefined scan", |result| &result.name))
-        .column("mean error, mm", |row| row.error().map(|error| error.mean_mm()))
-        .column("p95 error, mm", |row| row.error().map(|error| error.p95_mm()))
-        .column("part to mesh mean, mm", |row| row.error().map(|error| error.part_to_mesh_mean_mm))
-        .column("mesh to part mean, mm", |row| row.error().map(|error| error.mesh_to_part_mean_mm))
-        .column("mean normal error, deg", |row| row.error().map(|error| error.normal_mean_deg))
-        .column("p95 normal error, deg", |row| row.error().map(|error| error.normal_p95_deg))
-        .column("total, s", |row| Some(row.result?.total_s))
-        .column("per sample, µs", |row| Some(row.result?.per_sample_us))
-        .column("after the last sample, ms", |row| Some(row.result?.end_ms))
-        .column("samples", |row| Some(row.result?.samples))
-        .column("runs", |row| Some(row.result?.runs))
-        .column("cut back, %", |row| Some(row.result?.cut_back_share * 100.0))
-        .column("remark", |row| Some(row.result?.remarks.join("; ")).filter(|remark| !remark.is_empty()))
-        .table
+            ))
     }
-}
-
-/// One method on one scan; `None`: the scan as it came.
-#[derive(Clone, Copy)]
-struct Row<'a> {
-    case: &'a CaseResult,
-    scan: &'a ScanResult,
-    result: Option<&'a MethodResult>,
-}
-
-impl Row<'_> {
-    fn error(&self) -> Option<TouchedError> {
-        self.result.map_or(Some(self.scan.before), |result| result.error)
-    }
-}
-
-/// A dashed line at the error of the scan, as wide as the marks.
-fn as_it_came(series: &[Series], scan: &ScanResult, of: fn(&MethodResult, &TouchedError) -> Mark) -> Option<Series> {
-    let xs = || series.iter().flat_map(|series| &series.marks).map(|mark| mark.x.median);
-    let ends = [xs().reduce(f64::min)?, xs().reduce(f64::max)?];
-    let Mark { y, .. } = of(scan.methods.first()?, &scan.before);
-    Some(Series::new("unrefined scan", LineStroke::Dashed, ends.map(|x| Mark::at(x, y))))
 }
 
 /// The scans of a case, the finest first.

@@ -1,12 +1,12 @@
 //! The methods by which a scan is refined, and how long each takes.
 
 use std::fmt::Display;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::contact_points::ContactSculptor;
-use super::error::WholeScanError;
-use super::gaussian::{GaussianParams, GaussianSurface};
+use super::baselines::{ContactSculptor, GaussianParams, GaussianSurface};
 use super::part::{GivenPart, Part};
+use crate::error::Measured;
+use crate::timed;
 use touchup_core::haptic::{RefineParams, RoiSize, StepRule};
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
@@ -84,10 +84,9 @@ impl RefineMethod {
 }
 
 /// What a run may take.
-#[derive(Clone, Copy, Debug)]
 pub(super) struct RunLimits {
-    /// a run that takes longer is stopped
-    pub longest: Duration,
+    /// a run that takes longer is stopped, s
+    pub longest_s: f64,
     /// touches that the Gaussian process gets
     pub touches: usize,
 }
@@ -95,11 +94,11 @@ pub(super) struct RunLimits {
 /// A run from the scan to the result.
 pub(super) struct Run {
     pub mesh: TriMesh,
-    /// before the first sample
-    pub build: Duration,
+    /// before the first sample, s
+    pub build_s: f64,
     pub fed: Fed,
-    /// after the last sample
-    pub end: Duration,
+    /// after the last sample, s
+    pub end_s: f64,
     /// samples or touches that there are
     pub offered: usize,
     /// share of the updates that were cut back
@@ -109,8 +108,8 @@ pub(super) struct Run {
 /// What a method was given, one by one.
 #[derive(Default)]
 pub(super) struct Fed {
-    /// all of it
-    pub time: Duration,
+    /// all of it, s
+    pub time_s: f64,
     /// samples or touches
     pub given: usize,
     /// of them refused, and why the first
@@ -124,7 +123,7 @@ pub(super) struct Fed {
 fn feed<T, E: Display>(
     items: impl Iterator<Item = T>,
     lap: usize,
-    longest: Duration,
+    longest_s: f64,
     mut take: impl FnMut(T) -> Result<(), E>,
 ) -> Fed {
     let begun = Instant::now();
@@ -136,25 +135,20 @@ fn feed<T, E: Display>(
             fed.why.get_or_insert_with(|| error.to_string());
         }
         if fed.given % lap == 0 {
-            let time = begun.elapsed();
-            fed.laps.push((time - fed.time).as_secs_f64());
-            fed.time = time;
-            if time > longest {
+            let time_s = begun.elapsed().as_secs_f64();
+            fed.laps.push(time_s - fed.time_s);
+            fed.time_s = time_s;
+            if time_s > longest_s {
                 return fed;
             }
         }
     }
-    fed.time = begun.elapsed();
+    fed.time_s = begun.elapsed().as_secs_f64();
     fed
 }
 
 /// Refines `scan` by one method.
-pub(super) fn run(
-    method: RefineMethod,
-    part: &Part,
-    scan: &TriMesh,
-    limits: &RunLimits,
-) -> Result<Run, WholeScanError> {
+pub(super) fn run(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
     match method {
         RefineMethod::ContactPoints => Ok(sculpt(part, scan, limits)),
         RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, limits)),
@@ -164,11 +158,11 @@ pub(super) fn run(
 
 fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
     let &GivenPart { tip, compensator, scan_noise, .. } = part;
-    let usual = match method {
+    let mut params = match method {
         RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(tip),
         _ => RefineParams::robust(tip),
     };
-    let mut params = RefineParams { compensator, scan_noise, ..usual };
+    (params.compensator, params.scan_noise) = (compensator, scan_noise);
     match method {
         RefineMethod::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
         RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
@@ -180,55 +174,46 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
 }
 
 /// The haptic update, with the patch where the method has one.
-fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Result<Run, WholeScanError> {
+fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
     let GivenPart { samples, tip, scan_noise, .. } = &part.given;
     let copy = scan.clone();
-    let begun = Instant::now();
-    let patch = (method == RefineMethod::Patch).then(|| PatcherParams::new(tip.radius, tip.stiffness, *scan_noise));
-    let mut engine = Engine::new(copy, params(method, &part.given), patch, Renewal::AtEnd)?;
-    let build = begun.elapsed();
-    let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest, |sample| engine.push(sample).map(drop));
-    let pushed = Instant::now();
-    let (refiner, patcher) = engine.finish()?;
-    let counts = *refiner.counts();
-    let mesh = match patcher {
-        None => refiner.into_mesh(),
-        Some(mut patcher) => {
-            patcher.flush();
-            patcher.patched(scan, &FaceTree::new(scan))?.mesh
-        }
-    };
+    let (build_s, engine) = timed(|| {
+        let patch = (method == RefineMethod::Patch).then(|| PatcherParams::new(tip.radius, tip.stiffness, *scan_noise));
+        Engine::new(copy, params(method, &part.given), patch, Renewal::AtEnd)
+    });
+    let mut engine = engine?;
+    let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest_s, |sample| engine.push(sample).map(drop));
+    let (end_s, finished) = timed(|| -> Measured<_> {
+        let (refiner, patcher) = engine.finish()?;
+        let counts = *refiner.counts();
+        let Some(mut patcher) = patcher else { return Ok((counts, refiner.into_mesh())) };
+        patcher.flush();
+        Ok((counts, patcher.patched(scan, &FaceTree::new(scan))?.mesh))
+    });
+    let (counts, mesh) = finished?;
     let cut_back_share = counts.cut_back as f64 / counts.moved.max(1) as f64;
-    Ok(Run { mesh, build, fed, end: pushed.elapsed(), offered: samples.len(), cut_back_share })
+    Ok(Run { mesh, build_s, fed, end_s, offered: samples.len(), cut_back_share })
 }
 
 fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
     let (contacts, radius) = (&part.contacts, part.given.tip.radius);
-    let begun = Instant::now();
-    let mut sculptor = ContactSculptor::new(scan, radius, radius);
-    let build = begun.elapsed();
-    let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest, |contact| {
+    let (build_s, mut sculptor) = timed(|| ContactSculptor::new(scan, radius, radius));
+    let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest_s, |contact| {
         sculptor.push(&contact.reported).map(drop).ok_or(NO_CONTACT)
     });
-    let (mesh, end) = (sculptor.mesh, Duration::ZERO);
-    Run { mesh, build, fed, end, offered: contacts.len(), cut_back_share: 0.0 }
+    Run { mesh: sculptor.mesh, build_s, fed, end_s: 0.0, offered: contacts.len(), cut_back_share: 0.0 }
 }
 
 fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
-    let process = GaussianParams {
-        amplitude: part.given.scan_noise.max(CONTACT_NOISE),
-        length: 2.0 * part.given.tip.radius,
-        noise: CONTACT_NOISE,
-    };
+    let GivenPart { scan_noise, tip, .. } = &part.given;
+    let (amplitude, length) = (scan_noise.max(CONTACT_NOISE), 2.0 * tip.radius);
     let contacts = &part.contacts;
     let stride = contacts.len().div_ceil(limits.touches).max(1);
-    let begun = Instant::now();
-    let mut surface = GaussianSurface::new(scan, process);
-    let build = begun.elapsed();
-    let fed = feed(contacts.iter().step_by(stride), 1, limits.longest, |contact| {
+    let process = GaussianParams { amplitude, length, noise: CONTACT_NOISE };
+    let (build_s, mut surface) = timed(|| GaussianSurface::new(scan, process));
+    let fed = feed(contacts.iter().step_by(stride), 1, limits.longest_s, |contact| {
         surface.push(contact.point).then_some(()).ok_or(NO_CONTACT)
     });
-    let pushed = Instant::now();
-    let mesh = surface.mesh();
-    Run { mesh, build, fed, end: pushed.elapsed(), offered: contacts.len(), cut_back_share: 0.0 }
+    let (end_s, mesh) = timed(|| surface.mesh());
+    Run { mesh, build_s, fed, end_s, offered: contacts.len(), cut_back_share: 0.0 }
 }

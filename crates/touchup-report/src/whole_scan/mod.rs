@@ -4,20 +4,14 @@
 //! The surface error is measured where the part was touched, in both directions; the worse of the two counts. Runs are made
 //! in turns, so that a machine that becomes slower does so for all.
 
-mod contact_points;
-mod error;
+mod baselines;
 mod figures;
-mod gaussian;
 mod method;
 mod part;
 mod text;
 mod touched_error;
 
-use std::time::Duration;
-
-pub use contact_points::ContactSculptor;
-pub use error::WholeScanError;
-pub use gaussian::{GaussianParams, GaussianProcess, GaussianSurface};
+pub use baselines::{ContactSculptor, GaussianParams, GaussianProcess, GaussianSurface};
 pub use method::{Reach, RefineMethod};
 use method::{Run, RunLimits, run};
 pub use part::GivenPart;
@@ -25,6 +19,7 @@ use part::{Part, parts};
 pub use touched_error::TouchedError;
 
 use super::convergence::straight_line;
+use super::error::Measured;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
 use touchup_core::haptic::mean_edge;
@@ -179,15 +174,11 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn is_slow(&self, slow_s: f64) -> bool {
-        self.times.first().is_some_and(|&[total, ..]| total > slow_s)
-    }
-
-    fn run(&mut self, limits: &RunLimits) -> Result<(), WholeScanError> {
+    fn run(&mut self, limits: &RunLimits) -> Measured<()> {
         let run = run(self.method, self.part, self.scan, limits)?;
-        let samples = run.fed.time + run.end;
-        let per_sample_us = samples.as_secs_f64() * 1e6 / run.fed.given.max(1) as f64;
-        self.times.push([(run.build + samples).as_secs_f64(), per_sample_us, run.end.as_secs_f64() * 1e3]);
+        let samples_s = run.fed.time_s + run.end_s;
+        let per_sample_us = samples_s * 1e6 / run.fed.given.max(1) as f64;
+        self.times.push([run.build_s + samples_s, per_sample_us, run.end_s * 1e3]);
         if self.first.is_none() {
             let error = self.part.error_of(&run.mesh);
             self.first = Some((run, error));
@@ -197,26 +188,19 @@ impl Trial<'_> {
 
     fn result(&self, before: &TouchedError) -> Option<MethodResult> {
         let (Run { fed, offered, cut_back_share, .. }, error) = self.first.as_ref()?;
-        let mut remarks = Vec::new();
         let is_sparse = self.method == RefineMethod::GaussianProcess;
         let is_stopped = fed.refused + fed.given < *offered && !is_sparse;
-        if is_stopped {
-            remarks.push(format!("stopped for its time after {} of {offered} samples", fed.given));
-        }
-        if is_sparse && fed.given < *offered {
-            remarks.push(format!("given {} of {offered} contacts", fed.given));
-        }
-        if let Some(why) = &fed.why {
-            remarks.push(format!("{} of {} samples refused: {why}", fed.refused, fed.given));
-        }
-        if let Err(why) = error {
-            remarks.push(format!("the error is undefined: {why}"));
-        }
-        let error = error.as_ref().ok().copied();
+        let (why_undefined, error) = (error.as_ref().err(), error.as_ref().ok().copied());
         let is_worse = error.is_none_or(|error| error.mean_mm() > before.mean_mm());
-        if let Some(error) = error.filter(|_| is_worse) {
-            remarks.push(format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm()));
-        }
+        let remarks = [
+            is_stopped.then(|| format!("stopped for its time after {} of {offered} samples", fed.given)),
+            (is_sparse && fed.given < *offered).then(|| format!("given {} of {offered} contacts", fed.given)),
+            fed.why.as_ref().map(|why| format!("{} of {} samples refused: {why}", fed.refused, fed.given)),
+            why_undefined.map(|why| format!("the error is undefined: {why}")),
+            error
+                .filter(|_| is_worse)
+                .map(|error| format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm())),
+        ];
         let spread = |which: usize| Spread::of(self.times.iter().map(|times| times[which]).collect());
         Some(MethodResult {
             method: self.method,
@@ -230,7 +214,7 @@ impl Trial<'_> {
             cut_back_share: *cut_back_share,
             is_worse,
             is_stopped,
-            remarks,
+            remarks: remarks.into_iter().flatten().collect(),
         })
     }
 }
@@ -238,14 +222,10 @@ impl Trial<'_> {
 /// Measures every method on peaks, on the plate, and on given parts.
 ///
 /// # Errors
-/// [`WholeScanError`], mostly of given parts: a method that fails on its own says so in its result.
-pub fn whole_scan(
-    effort: Effort,
-    given: Option<&GivenPart>,
-    progress: &mut dyn FnMut(&str),
-) -> Result<WholeScan, WholeScanError> {
+/// [`MeasureError`](crate::error::MeasureError), mostly of given parts: a method that fails on its own says so in its result.
+pub fn whole_scan(effort: Effort, given: Option<&GivenPart>, progress: &mut dyn FnMut(&str)) -> Measured<WholeScan> {
     let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
-    let limits = RunLimits { longest: Duration::from_secs(effort.choose(2, 20)), touches: effort.choose(150, 300) };
+    let limits = RunLimits { longest_s: effort.choose(2.0, 20.0), touches: effort.choose(150, 300) };
     let parts = parts(effort, given, progress)?;
     let mut trials: Vec<Trial> = Vec::new();
     for part in &parts {
@@ -256,7 +236,9 @@ pub fn whole_scan(
         }
     }
     for repeat in 0..repeats {
-        for trial in trials.iter_mut().filter(|trial| !trial.is_slow(slow_s)) {
+        // what is slow runs once
+        let is_due = |trial: &&mut Trial| trial.times.first().is_none_or(|&[total_s, ..]| total_s <= slow_s);
+        for trial in trials.iter_mut().filter(is_due) {
             let (name, method) = (&trial.part.given.name, trial.method.name());
             progress(&format!("whole scan: {name}, {method}, {} of {repeats}", repeat + 1));
             trial.run(&limits)?;
@@ -266,14 +248,13 @@ pub fn whole_scan(
     Ok(WholeScan { cases, repeats, slow_s })
 }
 
-fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
-    let mut scans = Vec::new();
-    for scan in part.scans() {
+fn case(part: &Part, trials: &[Trial]) -> Measured<CaseResult> {
+    let result = |scan: &TriMesh| -> Measured<_> {
         let before = part.error_of(scan)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
         let methods = own.filter_map(|trial| trial.result(&before)).collect();
-        scans.push(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, methods });
-    }
+        Ok(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, methods })
+    };
     let gaussian =
         trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess);
     let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |(run, _)| &run.fed.laps);
@@ -284,7 +265,7 @@ fn case(part: &Part, trials: &[Trial]) -> Result<CaseResult, WholeScanError> {
         name: name.clone(),
         samples: samples.len(),
         duration_s: span_ns as f64 * 1e-9,
-        scans,
+        scans: part.scans().map(result).collect::<Result<_, _>>()?,
         gaussian: GaussianCost::of(each, part.contacts.len()),
     })
 }

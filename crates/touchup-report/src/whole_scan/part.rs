@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::error::WholeScanError;
 use super::touched_error::TouchedError;
 use crate::Effort;
 use crate::convergence::region_over;
+use crate::error::{MeasureError, Measured};
 use touchup_core::compare::{CompareError, TouchedRegion};
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh};
@@ -67,11 +67,7 @@ const CHORD_ERROR: f64 = 10e-6;
 const ON_PART: f64 = 1e-3;
 
 /// Peaks and plate, and the part that was given.
-pub(super) fn parts(
-    effort: Effort,
-    given: Option<&GivenPart>,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Vec<Part>, WholeScanError> {
+pub(super) fn parts(effort: Effort, given: Option<&GivenPart>, progress: &mut dyn FnMut(&str)) -> Measured<Vec<Part>> {
     // what is given first: it may be refused
     let given = given.map(|given| Part::new(given.clone(), Vec::new())).transpose()?;
     progress("whole scan: touching peaks");
@@ -89,7 +85,7 @@ fn simulated(
     (surface, truth): (&dyn Surface, TriMesh),
     path: &[Stroke],
     mut scans: Vec<TriMesh>,
-) -> Result<Part, WholeScanError> {
+) -> Measured<Part> {
     let params = StylusParams::default();
     let touch = touch(surface, path, &params, SEED)?;
     let mut sync = Synchroniser::new(SyncParams::default())?;
@@ -113,7 +109,7 @@ fn simulated(
 }
 
 /// Peaks: vertices with the noise and the bias of the usual scanner, and a raster over it.
-fn touched_peaks(effort: Effort) -> Result<Part, WholeScanError> {
+fn touched_peaks(effort: Effort) -> Measured<Part> {
     let peaks = Peaks::default();
     let ScannerParams { noise, bias, .. } = ScannerParams::default();
     let scanned = |&edge: &f64| -> Result<TriMesh, SimError> {
@@ -129,7 +125,7 @@ fn touched_peaks(effort: Effort) -> Result<Part, WholeScanError> {
 }
 
 /// The plate of the demo, scanned and touched as there; a quick one in one raster over its features.
-fn touched_plate(effort: Effort) -> Result<Part, WholeScanError> {
+fn touched_plate(effort: Effort) -> Measured<Part> {
     let (plate, usual) = (Plate::default(), ScannerParams::default());
     let mut path = plan_demo(&plate, &PathParams::default())?;
     if effort.is_quick {
@@ -144,7 +140,7 @@ fn touched_plate(effort: Effort) -> Result<Part, WholeScanError> {
 
 impl Part {
     /// - `others`: scans beside the one that was given.
-    fn new(given: GivenPart, others: Vec<TriMesh>) -> Result<Self, WholeScanError> {
+    fn new(given: GivenPart, others: Vec<TriMesh>) -> Measured<Self> {
         let GivenPart { truth, tip, compensator, .. } = &given;
         let tree = FaceTree::new(truth);
         let (compensator, gate, tip) = (*compensator, Some(ContactGateParams::default()), *tip);
@@ -160,7 +156,7 @@ impl Part {
         }
         let region = TouchedRegion::of(touched);
         if region.contacts().is_empty() {
-            return Err(WholeScanError::NothingTouched { samples: given.samples.len(), name: given.name });
+            return Err(MeasureError::NothingTouched { samples: given.samples.len(), name: given.name });
         }
         Ok(Self { given, tree, region, contacts, others })
     }

@@ -24,12 +24,7 @@ impl WholeScan {
             text.extend(case.densities());
             text.extend(case.gaussian.as_ref().map(|cost| case.gaussian_text(cost)));
         }
-        Chapter {
-            title: "Error against run time, whole scan".to_owned(),
-            text,
-            figures: self.figures(),
-            tables: vec![self.table()],
-        }
+        Chapter::of("Error against run time, whole scan", text, self.figures(), vec![self.table()])
     }
 }
 
@@ -46,28 +41,24 @@ impl CaseResult {
         let Self { name, samples, duration_s, .. } = self;
         let ScanResult { edge_mm, faces, before, .. } = scan;
         let [mean, p95, normals] = [before.mean_mm(), before.p95_mm(), before.normal_mean_deg];
-        let mut text = format!(
-            "{name}: {faces} faces with edges of {edge_mm:.1} mm, {samples} samples in {duration_s:.0} s of touching; the \
-             unrefined scan is off by {mean:.3} mm (p95 {p95:.3} mm, normals {normals:.1} deg)."
-        );
-        match scan.best() {
-            None => text += " No method reduced the error.",
-            Some(best) => {
-                let (best, times) = (describe(best), mean / best.mean_mm());
-                text += &format!(" The least mean error has {best}: {times:.1} times less than the scan.");
-            }
-        }
+        let best = scan.best().map_or(" No method reduced the error.".to_owned(), |best| {
+            let (best, times) = (describe(best), mean / best.mean_mm());
+            format!(" The least mean error has {best}: {times:.1} times less than the scan.")
+        });
         let front: Vec<String> = scan.front().into_iter().map(describe).collect();
-        if front.len() > 1 {
-            text +=
-                &format!(" No other method is both faster and more accurate than one of these: {}.", front.join(", "));
-        }
-        if let Some(haptic) = scan.best_haptic() {
-            text += &format!(" Of the regions of the haptic update alone the best is {}.", describe(haptic));
-            text += &same_regions(scan);
-            text += &against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
-        }
-        text
+        let front = (front.len() > 1).then(|| {
+            format!(" No other method is both faster and more accurate than one of these: {}.", front.join(", "))
+        });
+        let haptic = scan.best_haptic().map(|haptic| {
+            let (best, regions) = (describe(haptic), same_regions(scan));
+            let points = against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
+            format!(" Of the regions of the haptic update alone the best is {best}.{regions}{points}")
+        });
+        let (front, haptic) = (front.unwrap_or_default(), haptic.unwrap_or_default());
+        format!(
+            "{name}: {faces} faces with edges of {edge_mm:.1} mm, {samples} samples in {duration_s:.0} s of touching; the \
+             unrefined scan is off by {mean:.3} mm (p95 {p95:.3} mm, normals {normals:.1} deg).{best}{front}{haptic}"
+        )
     }
 
     /// What finer and coarser scans change.
@@ -137,10 +128,8 @@ fn same_regions(scan: &ScanResult) -> String {
     let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else { return String::new() };
     let is_same = |result: &&MethodResult| result.method != handle.method && result.error == handle.error;
     let same: Vec<&str> = scan.methods.iter().filter(is_same).map(|result| result.name.as_str()).collect();
-    if same.is_empty() {
-        return String::new();
-    }
-    format!(" With edges of {:.1} mm nothing but the handle moves with: {}.", scan.edge_mm, same.join(", "))
+    let text = format!(" With edges of {:.1} mm nothing but the handle moves with: {}.", scan.edge_mm, same.join(", "));
+    if same.is_empty() { String::new() } else { text }
 }
 
 /// Methods that stopped early or made the scan worse.

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use nalgebra::{Point3, Vector3};
 
 use super::problem::{Problem, State};
-use super::{explicit, rosenbrock};
+use super::rosenbrock;
 use crate::Effort;
 use touchup_core::haptic::dynamics::dormand_prince;
 use touchup_core::haptic::{FaceDynamics, FaceState, StepRule};
@@ -80,8 +80,8 @@ impl Method {
             problem.rate(y)
         };
         let state = match (self, setting) {
-            (Self::Euler, SolverSetting::Steps(steps)) => explicit::euler(start, end, steps, rate),
-            (Self::RungeKutta, SolverSetting::Steps(steps)) => explicit::runge_kutta(start, end, steps, rate),
+            (Self::Euler, SolverSetting::Steps(steps)) => euler(start, end, steps, rate),
+            (Self::RungeKutta, SolverSetting::Steps(steps)) => runge_kutta(start, end, steps, rate),
             (Self::DormandPrince, SolverSetting::RelativeTolerance(relative)) => {
                 dormand_prince::integrate(start, end, scale, relative, rate).ok()?
             }
@@ -103,6 +103,29 @@ impl Method {
         let is_finite = state.iter().all(|x| x.is_finite());
         is_finite.then_some(Solved { face, evaluations: count.get() })
     }
+}
+
+/// `steps` steps of Euler's method: order 1, one evaluation each.
+fn euler(start: State, end: f64, steps: usize, mut rate: impl FnMut(&State) -> State) -> State {
+    let dt = end / steps as f64;
+    (0..steps).fold(start, |y, _| moved(&y, dt, &rate(&y)))
+}
+
+/// `steps` steps of the classical Runge–Kutta method: order 4, four evaluations each.
+fn runge_kutta(start: State, end: f64, steps: usize, mut rate: impl FnMut(&State) -> State) -> State {
+    let dt = end / steps as f64;
+    (0..steps).fold(start, |y, _| {
+        let k1 = rate(&y);
+        let k2 = rate(&moved(&y, 0.5 * dt, &k1));
+        let k3 = rate(&moved(&y, 0.5 * dt, &k2));
+        let k4 = rate(&moved(&y, dt, &k3));
+        let mean = [0, 1, 2, 3].map(|i| (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0);
+        moved(&y, dt, &mean)
+    })
+}
+
+fn moved(y: &State, dt: f64, rate: &State) -> State {
+    [0, 1, 2, 3].map(|i| y[i] + dt * rate[i])
 }
 
 fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<Solved> {

@@ -1,7 +1,6 @@
 //! Work-precision of one face held against one sample: error at the end against run time and against evaluations of the
 //! right-hand side, for explicit, implicit and exact integrators, from the paper's stiffness to h_min = 1 nm.
 
-mod explicit;
 mod method;
 mod problem;
 mod reference;
@@ -61,8 +60,8 @@ pub struct Curve {
     pub method: Method,
     /// from coarse to fine, without those at which it gave up
     pub points: Vec<IntegratorRun>,
-    /// at which it gave up
-    pub gave_up: Vec<SolverSetting>,
+    /// number of settings at which it gave up
+    pub gave_up: usize,
 }
 
 /// One integrator with one setting.
@@ -83,13 +82,13 @@ pub struct IntegratorRun {
 impl WorkPrecision {
     /// Measures all of it.
     pub fn measure(effort: Effort, progress: &mut dyn FnMut(&str)) -> Self {
-        let clock = TimingParams { repeats: effort.choose(9, 31), batch_s: effort.choose(1e-4, 5e-4) };
+        let repeats = effort.choose(9, 31);
         let h_mins = effort.choose(&H_MINS_QUICK_M[..], &H_MINS_M[..]);
-        let mut measured = Self { cases: Vec::new(), repeats: clock.repeats, without_reference: Vec::new() };
+        let mut measured = Self { cases: Vec::new(), repeats, without_reference: Vec::new() };
         for (h_min_m, tilt_deg) in h_mins.iter().flat_map(|h_min| TILTS_DEG.map(|tilt| (*h_min, tilt))) {
             let name = format!("h_min {} mm, force tilted by {tilt_deg}°", three_digits(1e3 * h_min_m));
             progress(&format!("work-precision: {name}"));
-            match case(h_min_m, tilt_deg, effort, &clock) {
+            match case(h_min_m, tilt_deg, effort, repeats) {
                 Some(case) => measured.cases.push(case),
                 None => measured.without_reference.push(name),
             }
@@ -99,52 +98,37 @@ impl WorkPrecision {
 }
 
 /// `None` where there is nothing to compare with.
-fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, clock: &TimingParams) -> Option<FaceCase> {
+fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<FaceCase> {
     let problem = Problem::of(h_min_m, tilt_deg.to_radians());
     let right = reference(&problem)?;
     let travel_m = right.b.coords.norm();
     let floor_m = (REFERENCE_SHARE * h_min_m).max(REFERENCE_ROUNDINGS * f64::EPSILON * travel_m);
     let curve = |method: Method| {
-        let (mut points, mut gave_up) = (Vec::new(), Vec::new());
-        for setting in method.settings(effort) {
-            let Some(solved) = method.solve(&problem, setting) else {
-                gave_up.push(setting);
-                continue;
-            };
-            let time_s = clock.time(|| method.solve(black_box(&problem), black_box(setting)));
-            points.push(IntegratorRun {
-                setting,
-                error_m: (solved.face.b - right.b).norm().max(floor_m),
-                normal_error: (solved.face.n - right.n).norm(),
-                evaluations: solved.evaluations,
-                time_s,
-            });
-        }
-        Curve { method, points, gave_up }
+        let settings = method.settings(effort);
+        let run = |&setting: &SolverSetting| {
+            let Solved { face, evaluations } = method.solve(&problem, setting)?;
+            let (error_m, normal_error) = ((face.b - right.b).norm().max(floor_m), (face.n - right.n).norm());
+            let readings = (repeats, effort.choose(1e-4, 5e-4));
+            let time_s = time(readings, || method.solve(black_box(&problem), black_box(setting)));
+            Some(IntegratorRun { setting, error_m, normal_error, evaluations, time_s })
+        };
+        let points: Vec<_> = settings.iter().filter_map(run).collect();
+        Curve { method, gave_up: settings.len() - points.len(), points }
     };
     Some(FaceCase { h_min_m, tilt_deg, travel_m, floor_m, curves: Method::ALL.map(curve).to_vec() })
 }
 
-/// How times are taken.
-struct TimingParams {
-    repeats: usize,
-    /// a single reading spans so many seconds, or one solve
-    batch_s: f64,
-}
-
-impl TimingParams {
-    /// Seconds for one call.
-    fn time<T>(&self, mut solve: impl FnMut() -> T) -> Spread {
-        let mut seconds = |calls: usize| timed(|| (0..calls).for_each(|_| drop(black_box(solve())))).0;
-        seconds(1);
-        let mut calls = 1;
-        // also warms up
-        while calls < 1 << 20 && seconds(calls) < self.batch_s {
-            calls *= 2;
-        }
-        let times = (0..self.repeats).map(|_| seconds(calls) / calls as f64).collect();
-        Spread::of(times).unwrap_or(Spread::from(f64::NAN))
+/// Seconds for one call: so many readings, each of which spans so many seconds, or one call.
+fn time<T>((repeats, batch_s): (usize, f64), mut solve: impl FnMut() -> T) -> Spread {
+    let mut seconds = |calls: usize| timed(|| (0..calls).for_each(|_| drop(black_box(solve())))).0;
+    seconds(1);
+    let mut calls = 1;
+    // also warms up
+    while calls < 1 << 20 && seconds(calls) < batch_s {
+        calls *= 2;
     }
+    let times = (0..repeats).map(|_| seconds(calls) / calls as f64).collect();
+    Spread::of(times).unwrap_or(Spread::from(f64::NAN))
 }
 
 impl FaceCase {

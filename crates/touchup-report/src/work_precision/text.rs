@@ -1,6 +1,6 @@
 //! The results as a chapter, with its text.
 
-use super::{FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
+use super::{Curve, FaceCase, IntegratorRun, Method, PAPER_H_MIN_M, TILTS_DEG, WorkPrecision};
 use crate::number::{range, three_digits};
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
 
@@ -13,14 +13,10 @@ impl WorkPrecision {
     /// Chapter 1 of the report.
     pub fn chapter(&self) -> Chapter {
         let shown = self.cases.iter().filter(|case| SHOWN_H_MINS_M.contains(&case.h_min_m));
-        let mut figures: Vec<_> = shown.flat_map(|case| [self.time_figure(case), evaluations_figure(case)]).collect();
-        figures.extend(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt)));
-        Chapter {
-            title: "Work-precision of one face".to_owned(),
-            text: self.text(),
-            figures,
-            tables: vec![self.ranking_table(), self.one_step_table()],
-        }
+        let figures = shown.flat_map(|case| self.error_figures(case));
+        let figures = figures.chain(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt))).collect();
+        let tables = vec![self.ranking_table(), self.one_step_table()];
+        Chapter::of("Work-precision of one face", self.text(), figures, tables)
     }
 
     /// What a practitioner should take from it.
@@ -30,21 +26,20 @@ impl WorkPrecision {
     }
 
     fn text(&self) -> Vec<String> {
-        let mut text = vec![
-            format!(
-                "One face is held against one sample: 2 N for 5 ms, the tip 0.5 mm above the plane of the face and 0.5 mm beside \
-                 its barycentre, with the paper's α, β and δ and f_max 10 N. The smaller h_min, the stiffer the equations. The \
-                 error is the distance of the barycentre at the end from a reference of another kind (Radau IIA of order 5 in \
-                 the plane of normal and force, halved until it agrees with itself to {}). A time is that of the whole sample, \
-                 the median of {} repeats of many solves. One Jacobian counts as four evaluations, one flow that is solved \
-                 exactly as one.",
-                three_digits(1e-13),
-                self.repeats
-            ),
-            "The implicit solver is RODAS 4(3), L-stable, written for this report: the crate diffsol would bring a hundred more \
-             crates along for four unknowns. Every integrator gets the same right-hand side and the same compiler."
-                .to_owned(),
-        ];
+        let setting = format!(
+            "One face is held against one sample: 2 N for 5 ms, the tip 0.5 mm above the plane of the face and 0.5 mm beside \
+             its barycentre, with the paper's α, β and δ and f_max 10 N. The smaller h_min, the stiffer the equations. The \
+             error is the distance of the barycentre at the end from a reference of another kind (Radau IIA of order 5 in \
+             the plane of normal and force, halved until it agrees with itself to {}). A time is that of the whole sample, \
+             the median of {} repeats of many solves. One Jacobian counts as four evaluations, one flow that is solved \
+             exactly as one.",
+            three_digits(1e-13),
+            self.repeats
+        );
+        let solvers = "The implicit solver is RODAS 4(3), L-stable, written for this report: the crate diffsol would bring a \
+                       hundred more crates along for four unknowns. Every integrator gets the same right-hand side and the \
+                       same compiler.";
+        let mut text = vec![setting, solvers.to_owned()];
         text.extend([Method::Lie, Method::DriftCorrected].into_iter().filter_map(|method| self.worst_step(method)));
         text.extend(LEVELS_M.map(|level| self.wins_and_losses(level)));
         text.extend(self.explicit_limits());
@@ -80,36 +75,33 @@ impl WorkPrecision {
     /// The fastest integrator for an error: where it is an exact step, and where not, by how much.
     fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
         let outcomes: Vec<FastestSolvers> = self.cases.iter().map(|case| FastestSolvers::of(case, error_m)).collect();
-        let won: Vec<&FastestSolvers> = outcomes.iter().filter(|outcome| outcome.is_won()).collect();
-        let lost: Vec<&FastestSolvers> =
-            outcomes.iter().filter(|outcome| !outcome.is_won() && outcome.other.is_some()).collect();
-        let mut text =
-            format!("To be within {name}, an exact step is the fastest in {} of {} cases", won.len(), outcomes.len());
-        if let Some((least, most)) = range(won.iter().filter_map(|outcome| outcome.factor())) {
-            let (least, most) = (three_digits(least), three_digits(most));
-            text += &format!(", {least} to {most} times as fast as the best solver ({})", h_mins(&won));
-        }
-        let alone = won.iter().filter(|outcome| outcome.other.is_none()).count();
-        if alone > 0 {
-            text += &format!("; in {alone} of them nothing else gets there");
-        }
-        text += ".";
-        if !lost.is_empty() {
-            let mut names: Vec<&str> = lost.iter().filter_map(|outcome| Some(outcome.other?.0.name())).collect();
-            names.sort_unstable();
-            names.dedup();
-            text += &format!(" In {} it is not ({}): {} wins", lost.len(), h_mins(&lost), names.join(" or "));
-            if let Some((_, most)) = range(lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?))) {
-                text += &format!(", by at most {} times", three_digits(most));
-            }
-            let never = lost.iter().filter(|outcome| outcome.exact.is_none()).count();
-            text += &if never > 0 { format!("; in {never} of them no exact step gets there.") } else { ".".to_owned() };
-        }
-        let unreached = outcomes.iter().filter(|outcome| outcome.exact.is_none() && outcome.other.is_none()).count();
-        if unreached > 0 {
-            text += &format!(" In {unreached} nothing gets there.");
-        }
-        text
+        let (won, others): (Vec<_>, Vec<_>) = outcomes.iter().partition(|outcome| outcome.is_won());
+        let (lost, unreached): (Vec<_>, Vec<_>) = others.into_iter().partition(|outcome| outcome.other.is_some());
+        let faster = range(won.iter().filter_map(|outcome| outcome.factor())).map(|(least, most)| {
+            let [least, most] = [least, most].map(three_digits);
+            format!(", {least} to {most} times as fast as the best solver ({})", h_mins(&won))
+        });
+        let alone = where_any(won.iter().filter(|outcome| outcome.other.is_none()).count(), |alone| {
+            format!("; in {alone} of them nothing else gets there")
+        });
+        let mut names: Vec<&str> = lost.iter().filter_map(|outcome| Some(outcome.other?.0.name())).collect();
+        names.sort_unstable();
+        names.dedup();
+        let slower = range(lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?)));
+        let slower = slower.map(|(_, most)| format!(", by at most {} times", three_digits(most))).unwrap_or_default();
+        let never = where_any(lost.iter().filter(|outcome| outcome.exact.is_none()).count(), |never| {
+            format!("; in {never} of them no exact step gets there")
+        });
+        let losses = where_any(lost.len(), |count| {
+            format!(" In {count} it is not ({}): {} wins{slower}{never}.", h_mins(&lost), names.join(" or "))
+        });
+        let nothing = where_any(unreached.len(), |count| format!(" In {count} nothing gets there."));
+        format!(
+            "To be within {name}, an exact step is the fastest in {} of {} cases{}{alone}.{losses}{nothing}",
+            won.len(),
+            outcomes.len(),
+            faster.unwrap_or_default()
+        )
     }
 
     /// Up to which stiffness the explicit solvers are of use.
@@ -153,13 +145,19 @@ impl WorkPrecision {
         ))
     }
 
-    fn time_figure(&self, case: &FaceCase) -> Figure {
-        let mark = |point: &IntegratorRun| Mark::at(point.time_s.times(1e6), 1e3 * point.error_m);
+    /// Error over time, and over evaluations.
+    fn error_figures(&self, case: &FaceCase) -> [Figure; 2] {
         let caption = format!(
             "Lower left is better. Bars: p10–p90 of {} repeats. Errors at the lower edge are as small as the reference can resolve.",
             self.repeats
         );
-        case.figure("time", &caption, Axis::log("time for the sample, µs", "time_us"), mark)
+        let time = Axis::log("time for the sample, µs", "time_us");
+        let counted = "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.";
+        let evaluations = Axis::log("evaluations of the right-hand side, or exact flows", "evaluations");
+        [
+            case.figure("time", &caption, time, |point| point.time_s.times(1e6)),
+            case.figure("evaluations", counted, evaluations, |point| (point.evaluations as f64).into()),
+        ]
     }
 
     /// Time to the first level over h_min.
@@ -173,28 +171,20 @@ impl WorkPrecision {
             });
             Series::new(method.name(), LineStroke::Joined, marks)
         });
-        Figure {
-            id: format!("work_precision_stiffness_{}", force_id(tilt_deg)),
-            title: format!("Time to be within {name}, {}", force_name(tilt_deg)),
-            caption: format!(
-                "The cheapest setting from which on every finer one is within {name} too; a curve ends where there is none among \
-                 those tried. The paper's h_min is {} mm.",
+        Figure::of(format!("work_precision_stiffness_{}", force_id(tilt_deg)), Drawing::Curves(series.to_vec()))
+            .title(format!("Time to be within {name}, {}", force_name(tilt_deg)))
+            .axes(Axis::log("h_min, mm", "h_min_mm"), Axis::log("time for the sample, µs", "time_us"))
+            .caption(format!(
+                "The cheapest setting from which on every finer one is within {name} too; a curve ends where there is \
+                 none among those tried. The paper's h_min is {} mm.",
                 three_digits(1e3 * PAPER_H_MIN_M)
-            ),
-            x: Axis::log("h_min, mm", "h_min_mm"),
-            y: Axis::log("time for the sample, µs", "time_us"),
-            drawing: Drawing::Curves(series.to_vec()),
-        }
+            ))
     }
 
     fn ranking_table(&self) -> Table {
-        let rankings: Vec<_> = self
-            .cases
-            .iter()
-            .flat_map(|case| LEVELS_M.map(|(error_m, name)| (case, name, case.ranking(error_m))))
-            .collect();
-        let caption = "Time for the sample; empty: not reached with any setting that was tried.";
-        let table = Table::of("work_precision_fastest", "Fastest integrator for an error", caption, &rankings)
+        let at_levels = |case| LEVELS_M.map(|(error_m, name)| (case, name, FaceCase::ranking(case, error_m)));
+        let rankings: Vec<_> = self.cases.iter().flat_map(at_levels).collect();
+        let table = Table::of("work_precision_fastest", "Fastest integrator for an error", &rankings)
             .column("h_min, mm", |(case, ..)| 1e3 * case.h_min_m)
             .column("tilt, °", |(case, ..)| case.tilt_deg)
             .column("within", |(_, name, _)| *name)
@@ -205,13 +195,11 @@ impl WorkPrecision {
                 Some(point.time_s.times(1e6))
             })
         });
-        times.table
+        times.caption("Time for the sample; empty: not reached with any setting that was tried.")
     }
 
     fn one_step_table(&self) -> Table {
-        let caption =
-            "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution.";
-        let table = Table::of("work_precision_one_step", "The whole sample in one exact step", caption, &self.cases)
+        let table = Table::of("work_precision_one_step", "The whole sample in one exact step", &self.cases)
             .column("h_min, mm", |case| 1e3 * case.h_min_m)
             .column("tilt, °", |case| case.tilt_deg)
             .column("travel, mm", |case| 1e3 * case.travel_m);
@@ -223,7 +211,9 @@ impl WorkPrecision {
                 .column(format!("{name}: normal, °"), |case| Some(step(case)?.normal_error.to_degrees()))
                 .column(format!("{name}: time, µs"), |case| Some(step(case)?.time_s.times(1e6)))
         });
-        steps.table
+        steps.caption(
+            "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution.",
+        )
     }
 }
 
@@ -251,6 +241,11 @@ impl FastestSolvers {
     }
 }
 
+/// The text of a count, where it is not 0.
+fn where_any(count: usize, text: impl Fn(usize) -> String) -> String {
+    if count > 0 { text(count) } else { String::new() }
+}
+
 /// "h_min 1 nm to 1 µm".
 fn h_mins(outcomes: &[&FastestSolvers]) -> String {
     match range(outcomes.iter().map(|outcome| outcome.h_min_m)) {
@@ -274,40 +269,29 @@ fn time(seconds: Spread) -> String {
     format!("{median} {name} ({p10}–{p90})")
 }
 
-fn evaluations_figure(case: &FaceCase) -> Figure {
-    let mark = |point: &IntegratorRun| Mark::at(point.evaluations as f64, 1e3 * point.error_m);
-    let axis = Axis::log("evaluations of the right-hand side, or exact flows", "evaluations");
-    let caption = "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.";
-    case.figure("evaluations", caption, axis, mark)
-}
-
 impl FaceCase {
-    fn figure(&self, over: &str, caption: &str, x: Axis, mark: impl Fn(&IntegratorRun) -> Mark) -> Figure {
-        let series = self
-            .curves
-            .iter()
-            .map(|curve| Series::new(curve.method.name(), LineStroke::Joined, curve.points.iter().map(&mark)));
+    fn figure(&self, over: &str, caption: &str, axis: Axis, x: fn(&IntegratorRun) -> Spread) -> Figure {
+        let series = self.curves.iter().map(|curve| {
+            let marks = curve.points.iter().map(|point| Mark::at(x(point), 1e3 * point.error_m));
+            Series::new(curve.method.name(), LineStroke::Joined, marks)
+        });
         let (exponent, tilt_deg) = ((self.h_min_m * 1e9).round(), self.tilt_deg);
-        Figure {
-            id: format!("work_precision_{over}_{exponent}nm_{}", force_id(tilt_deg)),
-            title: format!("Error at the end of one sample: h_min {}, {}", length(self.h_min_m), force_name(tilt_deg)),
-            caption: format!("{caption}{}", self.gave_up()),
-            x,
-            y: Axis::log("error of the barycentre, mm", "error_mm"),
-            drawing: Drawing::Curves(series.collect()),
-        }
+        let id = format!("work_precision_{over}_{exponent}nm_{}", force_id(tilt_deg));
+        Figure::of(id, Drawing::Curves(series.collect()))
+            .title(format!("Error at the end of one sample: h_min {}, {}", length(self.h_min_m), force_name(tilt_deg)))
+            .axes(axis, Axis::log("error of the barycentre, mm", "error_mm"))
+            .caption(format!("{caption}{}", self.gave_up()))
     }
 
     /// Which integrators gave up, and how often; empty where none did.
     fn gave_up(&self) -> String {
-        let giving_up = self.curves.iter().filter(|curve| !curve.gave_up.is_empty());
-        let failures: Vec<String> = giving_up
-            .map(|curve| {
-                let all = curve.gave_up.len() + curve.points.len();
-                format!("{} gave up at {} of {all} settings", curve.method.name(), curve.gave_up.len())
-            })
-            .collect();
-        if failures.is_empty() { String::new() } else { format!(" {}.", failures.join("; ")) }
+        let giving_up = self.curves.iter().filter(|curve| curve.gave_up > 0);
+        let failure = |curve: &Curve| {
+            let all = curve.gave_up + curve.points.len();
+            format!("{} gave up at {} of {all} settings", curve.method.name(), curve.gave_up)
+        };
+        let failures: Vec<String> = giving_up.map(failure).collect();
+        where_any(failures.len(), |_| format!(" {}.", failures.join("; ")))
     }
 }
 

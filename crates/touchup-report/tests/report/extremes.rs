@@ -1,6 +1,6 @@
 //! The extremes of the report: each has its right answer from another reason than the code.
 
-use touchup_report::extremes;
+use touchup_report::extremes::extremes;
 
 #[test]
 fn every_extreme_gets_the_right_answer() {

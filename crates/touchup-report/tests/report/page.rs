@@ -1,10 +1,9 @@
 //! The files of a report: well formed, without a number that is none, and with every digit in the CSV.
 
 use serde_json::Value;
-use touchup_report::{
-    Axis, Chapter, Drawing, Figure, LineStroke, Mark, OutputFile, Panel, Report, ReportError, Series, Spread, Table,
-    TableCell,
-};
+use touchup_report::document::Report;
+use touchup_report::files::{OutputFile, ReportError};
+use touchup_report::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Series, Spread, Table, TableCell};
 
 const HOSTILE: &str = "a < b & \"c\" > 'd' \u{1}";
 

@@ -6,10 +6,13 @@ use touchup_core::compare::TouchedRegion;
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_core::stylus::{CompensatorParams, Sample, Wrench};
-use touchup_report::{
-    ContactSculptor, Drawing, Effort, GaussianParams, GaussianProcess, GaussianSurface, GivenPart, RefineMethod, Rule,
-    TableCell, TouchedError, WholeScanError, convergence, fit_decay, straight_line, whole_scan,
+use touchup_report::convergence::{Rule, convergence, fit_decay, straight_line};
+use touchup_report::error::MeasureError;
+use touchup_report::whole_scan::{
+    ContactSculptor, GaussianParams, GaussianProcess, GaussianSurface, GivenPart, RefineMethod, TouchedError,
+    whole_scan,
 };
+use touchup_report::{Drawing, Effort, TableCell};
 
 /// A square sheet of `cells` × `cells` squares of 1 mm at height `z` (m), looking up.
 fn sheet(cells: u32, z: f64) -> TriMesh {
@@ -160,13 +163,13 @@ fn each_law_is_known_again() {
     let sweeps = (1..=10).map(f64::from);
     let power: Vec<f64> = sweeps.clone().map(|sweep| 0.8 * sweep.powf(-0.7)).collect();
     let decay = fit_decay(&power).unwrap();
-    assert!((decay.power.rate - 0.7).abs() < 1e-12 && (decay.power.start - 0.8).abs() < 1e-12);
+    assert!((decay.power.slope + 0.7).abs() < 1e-12 && (decay.power.offset.exp() - 0.8).abs() < 1e-12);
     assert!((decay.power.r_squared.unwrap() - 1.0).abs() < 1e-12);
     assert!(decay.exponential.r_squared.unwrap() < 0.95, "and the other law is not it");
 
     let exponential: Vec<f64> = sweeps.map(|sweep| 2.4 * (-0.3 * sweep).exp()).collect();
     let decay = fit_decay(&exponential).unwrap();
-    assert!((decay.exponential.rate - 0.3).abs() < 1e-12 && (decay.exponential.start - 2.4).abs() < 1e-12);
+    assert!((decay.exponential.slope + 0.3).abs() < 1e-12 && (decay.exponential.offset.exp() - 2.4).abs() < 1e-12);
     assert!((decay.exponential.r_squared.unwrap() - 1.0).abs() < 1e-12);
     assert!(decay.power.r_squared.unwrap() < 0.95);
     assert!((decay.at(4.0)[0] - exponential[3]).abs() < 1e-12);
@@ -266,7 +269,7 @@ fn what_touches_nothing_is_refused() {
     let mut given = given();
     given.samples.iter_mut().for_each(|sample| sample.pose_ot.translation.z += 0.1);
     let refused = whole_scan(QUICK, Some(&given), &mut |_| {});
-    assert!(matches!(refused, Err(WholeScanError::NothingTouched { samples: 12_000, .. })), "{refused:?}");
+    assert!(matches!(refused, Err(MeasureError::NothingTouched { samples: 12_000, .. })), "{refused:?}");
 }
 
 #[test]
