@@ -13,7 +13,7 @@ use touchup::ros::messages::{
     ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point, ProbeFeatureResponse,
     ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, SetBoolResponse, UndoResponse, Vector3,
 };
-use touchup::ros::port::{Arrival, Call, GoalEnd, Publication};
+use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -91,16 +91,16 @@ fn main() -> anyhow::Result<()> {
                     ids: (0..MOST_NAMED).collect(),
                 });
             }
-            Arrival::Call(Call::ProbeFeature(request, reply)) => {
+            Arrival::Call(Call::Arm(ArmOrder::Feature(request, reply))) => {
                 for index in 0..TOUCHES {
-                    port.publish(Publication::ProbeTouch(Box::new(touch(request.id, index))));
+                    port.publish(Publication::ProbeTouch(touch(request.id, index)));
                 }
                 let result = ProbeResult { id: request.id, code: 1, feature: outline(), ..ProbeResult::default() };
                 let result = ProbeResult { message: "reached".to_owned(), touch_count: TOUCHES, ..result };
-                port.publish(Publication::ProbeResult(Box::new(result.clone())));
+                port.publish(Publication::ProbeResult(result.clone()));
                 reply.send(ProbeFeatureResponse { result });
             }
-            Arrival::Call(Call::Probe(request, goal)) => {
+            Arrival::Call(Call::Arm(ArmOrder::Goal(request, goal))) => {
                 goal.accept.send(!request.ids.is_empty());
                 (0..3).for_each(|touch| (goal.feedback.0)(ProbeFeedback { touch, ..ProbeFeedback::default() }));
                 let (ids, codes) = ((0..MOST_NAMED).collect(), vec![4; MOST_NAMED as usize]);

@@ -50,21 +50,17 @@ pub enum ArgumentError {
         /// what
         needs: &'static str,
     },
-    /// not of the form `NAME:=VALUE`
-    #[error("{argument} {text}: it must be {form}")]
+    /// not of the form `NAME:=VALUE`, or a variable of the environment that means nothing
+    #[error("{given}: it must be {form}")]
     Form {
-        /// which argument
-        argument: &'static str,
-        /// as given
-        text: String,
+        /// which argument or variable, as given
+        given: String,
         /// how it looks
         form: &'static str,
     },
     /// no name of ROS
-    #[error("{argument} {text}: {source}")]
+    #[error("--remap {text}: {source}")]
     Name {
-        /// which argument
-        argument: &'static str,
         /// as given
         text: String,
         /// what is wrong
@@ -93,16 +89,6 @@ pub enum ArgumentError {
         path: PathBuf,
         /// with line and column
         reason: String,
-    },
-    /// a variable of the environment that means nothing
-    #[error("{variable}={value}: it must be {allowed}")]
-    Environment {
-        /// which one
-        variable: &'static str,
-        /// as set
-        value: String,
-        /// what may stand there
-        allowed: &'static str,
     },
 }
 
@@ -150,15 +136,11 @@ pub fn split<T: AsRef<OsStr>>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>
     let (mut others, mut ros) = (Vec::new(), Vec::new());
     let mut is_ros = false;
     for argument in arguments {
-        let word = argument.as_ref();
-        if word == "--ros-args" {
-            is_ros = true;
-        } else if is_ros && word == "--" {
-            is_ros = false;
-        } else if is_ros {
-            ros.push(argument);
+        let begins = argument.as_ref() == "--ros-args";
+        if begins || (is_ros && argument.as_ref() == "--") {
+            is_ros = begins;
         } else {
-            others.push(argument);
+            if is_ros { &mut ros } else { &mut others }.push(argument);
         }
     }
     (others, ros)
@@ -204,7 +186,11 @@ impl NodeConfig {
                     next("a name")?;
                 }
                 known if KNOWN.contains(&known) => {}
-                _ => return Err(unknown(argument)),
+                _ => {
+                    let long: Vec<_> = KNOWN.iter().copied().filter(|known| known.len() > 2).collect();
+                    let near = nearest(argument, &long);
+                    return Err(ArgumentError::Unknown { argument: argument.clone(), near });
+                }
             }
         }
         config.check_rules()?;
@@ -236,11 +222,8 @@ impl NodeConfig {
     }
 
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {
-        let malformed = || ArgumentError::Form {
-            argument: "--remap",
-            text: text.to_owned(),
-            form: "FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench",
-        };
+        let form = "FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench";
+        let malformed = || ArgumentError::Form { given: format!("--remap {text}"), form };
         let (from, to) = text.split_once(":=").ok_or_else(malformed)?;
         // NODE:FROM is for the node of that name alone
         let (node, from) = from.split_once(':').map_or((None, from), |(node, from)| (Some(node), from));
@@ -250,7 +233,7 @@ impl NodeConfig {
         if node.is_some_and(|node| node != self.place.node) {
             return Ok(());
         }
-        let of_text = |source| ArgumentError::Name { argument: "--remap", text: text.to_owned(), source };
+        let of_text = |source| ArgumentError::Name { text: text.to_owned(), source };
         match from {
             "__node" | "__name" => {
                 checked(format!("/{to}")).map_err(of_text)?;
@@ -273,7 +256,7 @@ impl NodeConfig {
         for rule in &self.remaps {
             for name in [&rule.from, &rule.to] {
                 let text = format!("{}:={}", rule.from, rule.to);
-                self.place.expand(name).map_err(|source| ArgumentError::Name { argument: "--remap", text, source })?;
+                self.place.expand(name).map_err(|source| ArgumentError::Name { text, source })?;
             }
         }
         Ok(())
@@ -292,14 +275,9 @@ impl NodeConfig {
     }
 }
 
-fn unknown(argument: &str) -> ArgumentError {
-    let near = nearest(argument, &KNOWN.iter().copied().filter(|known| known.len() > 2).collect::<Vec<_>>());
-    ArgumentError::Unknown { argument: argument.to_owned(), near }
-}
-
 fn parameter(text: &str) -> Result<Override, ArgumentError> {
     let form = "NAME:=VALUE, as in scan:=part.ply";
-    let malformed = || ArgumentError::Form { argument: "-p", text: text.to_owned(), form };
+    let malformed = || ArgumentError::Form { given: format!("-p {text}"), form };
     let (name, value) = text.split_once(":=").ok_or_else(malformed)?;
     let (nodes, name) = name.split_once(':').unwrap_or(("/**", name));
     if name.is_empty() {
@@ -313,14 +291,8 @@ fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
     let text = parameters_file::read(path).map_err(|source| ArgumentError::Read { path: path.to_owned(), source })?;
     let entries = yaml::entries(&text).map_err(|reason| ArgumentError::File { path: path.to_owned(), reason })?;
     let origin = path.display().to_string();
-    let overrides = entries.into_iter().map(|(nodes, name, value)| Override {
-        nodes,
-        name,
-        value,
-        origin: origin.clone(),
-        is_file: true,
-    });
-    Ok(overrides.collect())
+    let given = |(nodes, name, value)| Override { nodes, name, value, origin: origin.clone(), is_file: true };
+    Ok(entries.into_iter().map(given).collect())
 }
 
 /// What the value of `--log-level` means here: debug, info, warn or error.
@@ -329,11 +301,9 @@ fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
 /// [`ArgumentError::Form`] for a level that ROS does not have.
 pub fn log_level(text: &str) -> Result<&'static str, ArgumentError> {
     let word = text.rsplit_once(":=").map_or(text, |(_, level)| level).to_lowercase();
-    LEVELS.iter().find(|(name, _)| *name == word).map(|(_, level)| *level).ok_or_else(|| ArgumentError::Form {
-        argument: "--log-level",
-        text: text.to_owned(),
-        form: "debug, info, warn, error or fatal",
-    })
+    let level = LEVELS.iter().find(|(name, _)| *name == word).map(|(_, level)| *level);
+    let form = "debug, info, warn, error or fatal";
+    level.ok_or_else(|| ArgumentError::Form { given: format!("--log-level {text}"), form })
 }
 
 /// Beyond that the ports of a domain lie over 65535.
@@ -341,11 +311,8 @@ const LAST_DOMAIN: u16 = 232;
 
 fn domain_id(value: Option<String>) -> Result<u16, ArgumentError> {
     let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(0) };
-    value.parse().ok().filter(|id| *id <= LAST_DOMAIN).ok_or(ArgumentError::Environment {
-        variable: "ROS_DOMAIN_ID",
-        value,
-        allowed: "0 to 232",
-    })
+    let malformed = || ArgumentError::Form { given: format!("ROS_DOMAIN_ID={value}"), form: "0 to 232" };
+    value.parse().ok().filter(|id| *id <= LAST_DOMAIN).ok_or_else(malformed)
 }
 
 fn localhost_only(variable: &impl Fn(&str) -> Option<String>) -> Result<bool, ArgumentError> {
@@ -356,10 +323,9 @@ fn localhost_only(variable: &impl Fn(&str) -> Option<String>) -> Result<bool, Ar
     match value.as_str() {
         "LOCALHOST" => Ok(true),
         "" | "SUBNET" | "SYSTEM_DEFAULT" => Ok(false),
-        _ => Err(ArgumentError::Environment {
-            variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
-            value,
-            allowed: "LOCALHOST or SUBNET (OFF is not to be had: the node would find nobody)",
+        _ => Err(ArgumentError::Form {
+            given: format!("ROS_AUTOMATIC_DISCOVERY_RANGE={value}"),
+            form: "LOCALHOST or SUBNET (OFF is not to be had: the node would find nobody)",
         }),
     }
 }

@@ -10,7 +10,7 @@ use std::thread::{Builder, JoinHandle};
 use super::arguments::NodeConfig;
 use super::clock::RosClock;
 use super::names::NameError;
-use super::port::{Arrival, Endpoint, Inbox, Port, Publication, Reply};
+use super::port::{Arrival, Call, Endpoint, Inbox, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
 
 /// Why the node cannot speak to others.
@@ -35,8 +35,9 @@ pub enum RosError {
 }
 
 /// Where arrivals go, and how many could not.
+#[derive(Debug)]
 pub(super) struct Arrivals {
-    inbox: Inbox,
+    pub inbox: Inbox,
     /// wrenches and poses, others
     dropped: [AtomicU64; 2],
     is_over: AtomicBool,
@@ -47,9 +48,10 @@ impl Arrivals {
         Self { inbox, dropped: [const { AtomicU64::new(0) }; 2], is_over: AtomicBool::new(false) }
     }
 
-    /// Puts it into the inbox of the node, or counts it; never waits.
-    pub fn put(&self, arrival: Arrival) {
-        match self.inbox.try_send(arrival) {
+    /// Puts it into the inbox of the node, or counts it; never waits. Whether it got in.
+    pub fn put(&self, arrival: Arrival) -> bool {
+        let put = self.inbox.try_send(arrival);
+        match &put {
             Ok(()) => {}
             Err(TrySendError::Full(lost)) => {
                 let which = usize::from(!matches!(lost, Arrival::Wrench(..) | Arrival::Pose(..)));
@@ -57,6 +59,7 @@ impl Arrivals {
             }
             Err(TrySendError::Disconnected(_)) => self.end(),
         }
+        put.is_ok()
     }
 
     /// Reports who else is on a topic: to the log, and to the node for its diagnostics.
@@ -107,6 +110,11 @@ impl Exchange {
         })
     }
 
+    /// A service or the action was called.
+    pub fn call(&self, call: Call) {
+        self.arrivals.put(Arrival::Call(call));
+    }
+
     /// An answer that goes out from the thread that sends.
     pub fn reply<A: Send + 'static, E: Display>(
         self: &Arc<Self>,
@@ -129,6 +137,11 @@ impl Exchange {
         urgent: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
         mesh: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
     ) -> io::Result<[JoinHandle<()>; 2]> {
+        // what is urgent waits for nobody
+        let urgent = move |publication| match urgent(publication) {
+            Sent::Later(_) => Sent::Refused,
+            sent => sent,
+        };
         Ok([
             self.thread("touchup-send", move |exchange| exchange.urgent.send(urgent))?,
             self.thread("touchup-mesh", move |exchange| exchange.mesh.send(mesh))?,
@@ -168,8 +181,12 @@ pub(super) struct Joined<C> {
 
 impl<C: Send + Sync> Port for Joined<C> {
     fn publish(&self, publication: Publication) {
-        let queue = if publication.may_wait() { &self.exchange.mesh } else { &self.exchange.urgent };
-        queue.put(publication);
+        // the mesh, and touches with their curves, are large and may wait
+        match publication {
+            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => &self.exchange.mesh,
+            _ => &self.exchange.urgent,
+        }
+        .put(publication);
     }
 
     fn now_ns(&self) -> i64 {

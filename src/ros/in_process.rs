@@ -2,10 +2,11 @@
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use super::exchange::Arrivals;
 use super::locked;
 use super::messages::{PoseStamped, WrenchStamped};
 use super::port::{Arrival, Call, Inbox, Port, Publication, Reply, SamplePort};
@@ -20,7 +21,7 @@ struct InProcess {
     clock: Clock,
     /// the time of ROS, ns, and when it was that
     now_ns: Mutex<(i64, Instant)>,
-    dropped: [AtomicU64; 2],
+    arrivals: Arrivals,
     unsent: AtomicU64,
 }
 
@@ -40,7 +41,7 @@ impl Port for InProcess {
     }
 
     fn dropped(&self) -> [u64; 2] {
-        self.dropped.each_ref().map(|count| count.load(Ordering::Relaxed))
+        self.arrivals.dropped()
     }
 
     fn lost(&self) -> [u64; 2] {
@@ -60,7 +61,6 @@ impl Port for InProcess {
 #[derive(Clone, Debug)]
 pub struct OtherParticipants {
     port: Arc<InProcess>,
-    inbox: Inbox,
 }
 
 /// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
@@ -70,28 +70,21 @@ pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) 
         published: Mutex::default(),
         now_ns: Mutex::new((0, clock.now())),
         clock: clock.clone(),
-        dropped: [const { AtomicU64::new(0) }; 2],
+        arrivals: Arrivals::new(inbox),
         unsent: AtomicU64::new(0),
     });
-    (port.clone(), OtherParticipants { port, inbox })
+    (port.clone(), OtherParticipants { port })
 }
 
 impl OtherParticipants {
     /// Something arrives; where the node is too slow it is dropped and counted, as on a network. Whether it got in.
     pub fn arrive(&self, arrival: Arrival) -> bool {
-        match self.inbox.try_send(arrival) {
-            Ok(()) => true,
-            Err(TrySendError::Full(lost) | TrySendError::Disconnected(lost)) => {
-                let which = usize::from(!matches!(lost, Arrival::Wrench(..) | Arrival::Pose(..)));
-                self.port.dropped[which].fetch_add(1, Ordering::Relaxed);
-                false
-            }
-        }
+        self.port.arrivals.put(arrival)
     }
 
     /// Something arrives, as soon as the node has room for it. Whether the node is still there.
     pub fn arrive_patiently(&self, arrival: Arrival) -> bool {
-        self.inbox.send(arrival).is_ok()
+        self.port.arrivals.inbox.send(arrival).is_ok()
     }
 
     /// Calls a service: `world.call(|reply| Call::Undo(request, reply)).recv()` is the answer.

@@ -9,7 +9,7 @@ use super::locked;
 use super::messages::{self, *};
 use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
 use super::port::{Arrival, Reply};
-use super::services::Serves;
+use super::services::{Serves, services};
 
 /// Parameters that one call may name; beyond that it is answered short.
 const MOST_NAMES: usize = 1024;
@@ -25,102 +25,86 @@ const STRING: u8 = 4;
 type Announce = Box<dyn Fn(&str, &ParameterValue) + Send + Sync>;
 
 /// The values as others see them.
-struct PublicParameters {
+pub(super) struct PublicParameters {
     exchange: Arc<Exchange>,
     values: Mutex<Parameters>,
     announce: Announce,
 }
 
-type SetResults = Vec<Result<(), String>>;
-type SetReply = Box<dyn FnOnce(SetResults) + Send>;
-
-/// Offers the services.
-///
-/// - `announce`: publishes that a parameter has changed.
-pub(super) fn serve<B>(
-    back_end: &mut B,
-    exchange: &Arc<Exchange>,
-    values: &Parameters,
-    announce: Announce,
-) -> Result<(), RosError>
-where
-    B: Serves<GetParameters>
-        + Serves<GetParameterTypes>
-        + Serves<ListParameters>
-        + Serves<DescribeParameters>
-        + Serves<SetParameters>
-        + Serves<SetParametersAtomically>,
-{
-    let values = Mutex::new(values.clone());
-    let held = Arc::new(PublicParameters { exchange: exchange.clone(), values, announce });
-    let [for_get, for_types, for_set, for_all] = std::array::from_fn(|_| held.clone());
-    <B as Serves<GetParameters>>::serve(back_end, "~/get_parameters", move |request, reply| {
-        reply.send(get(&locked(&for_get.values), &request));
-    })?;
-    <B as Serves<GetParameterTypes>>::serve(back_end, "~/get_parameter_types", move |request, reply| {
-        reply.send(types(&locked(&for_types.values), &request));
-    })?;
-    <B as Serves<ListParameters>>::serve(back_end, "~/list_parameters", |request, reply| reply.send(list(&request)))?;
-    <B as Serves<DescribeParameters>>::serve(back_end, "~/describe_parameters", |request, reply| {
-        reply.send(describe_all(&request));
-    })?;
-    <B as Serves<SetParameters>>::serve(back_end, "~/set_parameters", move |request, reply| {
-        let answer = |results: SetResults| {
-            reply.send(SetParametersResponse { results: results.into_iter().map(result).collect() });
-        };
-        for_set.set(request.parameters, Box::new(answer));
-    })?;
-    <B as Serves<SetParametersAtomically>>::serve(back_end, "~/set_parameters_atomically", move |request, reply| {
-        for_all.set_all(request.parameters, reply);
-    })
+services! {
+    /// Offers the services.
+    fn serve(PublicParameters);
+    "~/get_parameters": GetParameters, |held, request, reply| reply.send(get(&locked(&held.values), &request));
+    "~/get_parameter_types": GetParameterTypes, |held, request, reply| {
+        reply.send(types(&locked(&held.values), &request));
+    };
+    "~/list_parameters": ListParameters, |_, request, reply| reply.send(list(&request));
+    "~/describe_parameters": DescribeParameters, |_, request, reply| reply.send(describe_all(&request));
+    "~/set_parameters": SetParameters, |held, request, reply| {
+        let wanted = request.parameters.into_iter().take(MOST_NAMES);
+        held.clone().set(wanted, Vec::new(), Reply::new(|results| reply.send(SetParametersResponse { results })));
+    };
+    "~/set_parameters_atomically": SetParametersAtomically, |held, request, reply| {
+        held.set_all(request.parameters, reply);
+    };
 }
 
 impl PublicParameters {
-    /// Asks the node for one after the other, and answers when all are done.
-    fn set(self: &Arc<Self>, wanted: Vec<Parameter>, answer: SetReply) {
-        let wanted: Vec<_> = wanted.into_iter().take(MOST_NAMES).collect();
-        self.clone().set_next(wanted.into_iter(), Vec::new(), answer);
+    /// - `announce`: publishes that a parameter has changed.
+    pub fn new(
+        exchange: &Arc<Exchange>,
+        values: &Parameters,
+        announce: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
+    ) -> Arc<Self> {
+        let values = Mutex::new(values.clone());
+        Arc::new(Self { exchange: exchange.clone(), values, announce: Box::new(announce) })
     }
 
-    fn set_next(self: Arc<Self>, mut wanted: std::vec::IntoIter<Parameter>, mut results: SetResults, answer: SetReply) {
+    /// Asks the node for one after the other, and answers when all are done.
+    fn set(
+        self: Arc<Self>,
+        mut wanted: impl Iterator<Item = Parameter> + Send + 'static,
+        mut results: Vec<SetParametersResult>,
+        answer: Reply<Vec<SetParametersResult>>,
+    ) {
         // what is refused here needs no answer of the node
         let (name, value) = loop {
-            let Some(next) = wanted.next() else { return answer(results) };
+            let Some(next) = wanted.next() else { return answer.send(results) };
             let checked = check(&locked(&self.values), &next);
             match checked {
                 Ok(value) => break (next.name, value),
-                Err(reason) => results.push(Err(reason)),
+                Err(reason) => results.push(result(Err(reason))),
             }
         };
         let exchange = self.exchange.clone();
         let (set_name, set_value) = (name.clone(), value.clone());
-        let reply = Reply::new(move |result: Result<(), String>| {
-            if result.is_ok() {
+        let reply = Reply::new(move |set: Result<(), String>| {
+            if set.is_ok() {
                 // it was checked before the node was asked
                 let _ = locked(&self.values).set_live(&set_name, &set_value);
                 (self.announce)(&set_name, &set_value);
             }
-            results.push(result);
-            self.set_next(wanted, results, answer);
+            results.push(result(set));
+            self.set(wanted, results, answer);
         });
         exchange.arrivals.put(Arrival::SetParameter(name, value, reply));
     }
 
     /// All or none, as far as the table of parameters can say before any is set.
     fn set_all(self: &Arc<Self>, wanted: Vec<Parameter>, reply: Reply<SetParametersAtomicallyResponse>) {
-        let answer = move |results: SetResults| {
-            let first = results.into_iter().find(Result::is_err).unwrap_or(Ok(()));
-            reply.send(SetParametersAtomicallyResponse { result: result(first) });
-        };
-        let refused = if wanted.len() > MOST_NAMES {
-            Some(format!("{} parameters in one call: at most {MOST_NAMES}", wanted.len()))
+        let checked = if wanted.len() > MOST_NAMES {
+            Err(format!("{} parameters in one call: at most {MOST_NAMES}", wanted.len()))
         } else {
             let values = locked(&self.values);
-            wanted.iter().find_map(|parameter| check(&values, parameter).err())
+            wanted.iter().try_for_each(|parameter| check(&values, parameter).map(drop))
         };
-        match refused {
-            Some(reason) => answer(vec![Err(reason)]),
-            None => self.set(wanted, Box::new(answer)),
+        let all_set = move |results: Vec<SetParametersResult>| {
+            let first = results.into_iter().find(|one| !one.successful).unwrap_or_else(|| result(Ok(())));
+            reply.send(SetParametersAtomicallyResponse { result: first });
+        };
+        match checked {
+            Err(_) => all_set(vec![result(checked)]),
+            Ok(()) => self.clone().set(wanted.into_iter(), Vec::new(), Reply::new(all_set)),
         }
     }
 }

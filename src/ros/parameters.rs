@@ -96,6 +96,9 @@ pub struct ParameterDescriptor {
     pub description: &'static str,
 }
 
+/// Names of the kinds of features by their numbers in messages.
+pub const KIND_NAMES: [&str; 8] = ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"];
+
 /// All parameters of the node, those of docs/ros.md and the one that every node has.
 pub const PARAMETERS: &[ParameterDescriptor] = {
     use Allowed::{Bool, Double, OneOf, String};
@@ -118,11 +121,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
         live("colour_by", OneOf("touched", &["touched", "mismatch"]), "colours of the mesh"),
         live("stale_ms", Double(100.0, 1.0, 10_000.0), "a stream without a message for so long is stale"),
-        live(
-            "flag_kind",
-            OneOf("hole", &["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"]),
-            "what a clicked point flags",
-        ),
+        live("flag_kind", OneOf("hole", &KIND_NAMES), "what a clicked point flags"),
         live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
         fixed("robot", OneOf("none", &["none", "sim", "ur"]), "the arm"),
         fixed("sim_part", String(""), "the part as it is, which a simulated arm touches"),
@@ -288,18 +287,12 @@ impl Parameters {
 
     /// One that is a word; empty for a name that is none.
     pub fn string(&self, name: &str) -> &str {
-        match self.0.get(name) {
-            Some(ParameterValue::String(word)) => word,
-            _ => "",
-        }
+        if let Some(ParameterValue::String(word)) = self.0.get(name) { word } else { "" }
     }
 
     /// One that is a number; NaN for a name that is none.
     pub fn double(&self, name: &str) -> f64 {
-        match self.0.get(name) {
-            Some(ParameterValue::Double(number)) => *number,
-            _ => f64::NAN,
-        }
+        if let Some(ParameterValue::Double(number)) = self.0.get(name) { *number } else { f64::NAN }
     }
 
     /// One that is on or off; off for a name that is none.

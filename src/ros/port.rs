@@ -63,16 +63,23 @@ pub enum Call {
     Reset(Reply<TriggerResponse>),
     /// `~/pause`
     Pause(SetBoolRequest, Reply<SetBoolResponse>),
-    /// `~/probe_all`
-    ProbeAll(Reply<TriggerResponse>),
-    /// `~/recover`
-    Recover(Reply<TriggerResponse>),
     /// `~/arm_state`
     ArmState(Reply<TriggerResponse>),
+    /// what an arm works at
+    Arm(ArmOrder),
+}
+
+/// An order to an arm, with what answers it.
+#[derive(Debug)]
+pub enum ArmOrder {
     /// `~/probe_feature`
-    ProbeFeature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
+    Feature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
     /// `~/probe`
-    Probe(ProbeGoal, Goal),
+    Goal(ProbeGoal, Goal),
+    /// `~/probe_all`
+    All(Reply<TriggerResponse>),
+    /// `~/recover`
+    Recover(Reply<TriggerResponse>),
 }
 
 /// A goal of the action `~/probe`.
@@ -145,20 +152,13 @@ pub enum Publication {
     /// `path`
     Path(Path),
     /// `probe_results`
-    ProbeResult(Box<ProbeResult>),
+    ProbeResult(ProbeResult),
     /// `probe_touches`
-    ProbeTouch(Box<ProbeTouch>),
+    ProbeTouch(ProbeTouch),
     /// `mismatch`
     Mismatch(HapticMismatch),
     /// `/diagnostics`
     Diagnostics(DiagnosticArray),
-}
-
-impl Publication {
-    /// Whether it is large and may wait: the mesh, and touches with their curves.
-    pub(super) fn may_wait(&self) -> bool {
-        matches!(self, Self::Tile(_) | Self::MeshPatch(_) | Self::ProbeTouch(_))
-    }
 }
 
 /// Who else is on a topic.

@@ -29,19 +29,12 @@ pub(super) enum Sent<M> {
 }
 
 impl<M> Sent<M> {
-    /// Of one that waits for nobody.
-    pub fn now<T>(self) -> Sent<T> {
+    /// The same of the publication that the message is of.
+    pub fn map<T>(self, publication: impl FnOnce(M) -> T) -> Sent<T> {
         match self {
             Self::Done => Sent::Done,
-            Self::Refused | Self::Later(_) => Sent::Refused,
-        }
-    }
-
-    /// Of one that waits for who listens slowly.
-    pub fn or_later<T>(self, publication: impl FnOnce(M) -> T) -> Sent<T> {
-        match self {
+            Self::Refused => Sent::Refused,
             Self::Later(message) => Sent::Later(publication(message)),
-            other => other.now(),
         }
     }
 }

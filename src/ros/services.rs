@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::exchange::{Exchange, RosError};
 use super::messages::*;
-use super::port::{Arrival, Call, Reply};
+use super::port::{ArmOrder, Call, Reply};
 
 /// A back end that offers services of one type.
 pub(super) trait Serves<S: RosService> {
@@ -16,36 +16,43 @@ pub(super) trait Serves<S: RosService> {
     ) -> Result<(), RosError>;
 }
 
+/// Services that share a state: the name of each, its type, and how the state answers it.
 macro_rules! services {
-    ($($name:literal: $service:ident, $call:expr;)+) => {
-        /// Offers all; what is asked goes to the inbox of the node.
-        pub(super) fn serve<B>(back_end: &mut B, exchange: &Arc<Exchange>) -> Result<(), RosError>
+    ($(#[$doc:meta])* fn $serve:ident($State:ty); $($name:literal: $service:ident, $answer:expr;)+) => {
+        $(#[$doc])*
+        pub(super) fn $serve<B>(back_end: &mut B, state: &Arc<$State>) -> Result<(), RosError>
         where
             $(B: Serves<$service>,)+
         {
-            $(let to = exchange.clone();
-            <B as Serves<$service>>::serve(back_end, $name, move |request, reply| {
-                to.arrivals.put(Arrival::Call($call(request, reply)));
-            })?;)+
+            type Answer<S, Q, A> = fn(&Arc<S>, Q, Reply<A>);
+            $({
+                type Request = <$service as RosService>::Request;
+                type Response = <$service as RosService>::Response;
+                let (state, answer): (_, Answer<$State, Request, Response>) = (state.clone(), $answer);
+                Serves::<$service>::serve(back_end, $name, move |request, reply| answer(&state, request, reply))?;
+            })+
             Ok(())
         }
     };
 }
+pub(super) use services;
 
 services! {
-    "~/flag_feature": FlagFeature, Call::Flag;
-    "~/unflag_feature": UnflagFeature, Call::Unflag;
-    "~/detect_features": DetectFeatures, Call::Detect;
-    "~/save_mesh": SaveMesh, Call::Save;
-    "~/resync_mesh": ResyncMesh, Call::Resync;
-    "~/undo": Undo, Call::Undo;
-    "~/redo": Undo, Call::Redo;
-    "~/reset": Trigger, |_, reply| Call::Reset(reply);
-    "~/pause": SetBool, Call::Pause;
-    "~/probe_all": Trigger, |_, reply| Call::ProbeAll(reply);
-    "~/recover": Trigger, |_, reply| Call::Recover(reply);
-    "~/arm_state": Trigger, |_, reply| Call::ArmState(reply);
-    "~/probe_feature": ProbeFeature, Call::ProbeFeature;
+    /// Offers those whose requests go to the inbox of the node.
+    fn serve(Exchange);
+    "~/flag_feature": FlagFeature, |to, request, reply| to.call(Call::Flag(request, reply));
+    "~/unflag_feature": UnflagFeature, |to, request, reply| to.call(Call::Unflag(request, reply));
+    "~/detect_features": DetectFeatures, |to, request, reply| to.call(Call::Detect(request, reply));
+    "~/save_mesh": SaveMesh, |to, request, reply| to.call(Call::Save(request, reply));
+    "~/resync_mesh": ResyncMesh, |to, request, reply| to.call(Call::Resync(request, reply));
+    "~/undo": Undo, |to, request, reply| to.call(Call::Undo(request, reply));
+    "~/redo": Undo, |to, request, reply| to.call(Call::Redo(request, reply));
+    "~/reset": Trigger, |to, _, reply| to.call(Call::Reset(reply));
+    "~/pause": SetBool, |to, request, reply| to.call(Call::Pause(request, reply));
+    "~/probe_all": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::All(reply)));
+    "~/recover": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::Recover(reply)));
+    "~/arm_state": Trigger, |to, _, reply| to.call(Call::ArmState(reply));
+    "~/probe_feature": ProbeFeature, |to, request, reply| to.call(Call::Arm(ArmOrder::Feature(request, reply)));
 }
 
 /// The action.

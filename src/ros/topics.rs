@@ -41,13 +41,6 @@ impl Topic {
 pub(super) const MESH: Topic = Topic::latched("mesh", 4096);
 pub(super) const PROBE_TOUCHES: Topic = Topic::reliable("probe_touches", 4096);
 pub(super) const MESH_PATCH: Topic = Topic::reliable("mesh_patch", 4096);
-const FEATURES: Topic = Topic::latched("features", 1);
-const FEATURE_MARKERS: Topic = Topic::latched("feature_markers", 1);
-const TIP: Topic = Topic::reliable("tip", 1);
-const PATH: Topic = Topic::latched("path", 1);
-const PROBE_RESULTS: Topic = Topic::reliable("probe_results", 100);
-const MISMATCH: Topic = Topic::best_effort("mismatch", 100);
-const DIAGNOSTICS: Topic = Topic::reliable("/diagnostics", 10);
 
 /// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no matter of matching.
 const SAMPLES: usize = 2048;
@@ -67,49 +60,42 @@ pub(super) trait Subscribes<M> {
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError>;
 }
 
-/// Announces the topics of what is small and urgent; what sends it, which waits for nobody.
-pub(super) fn urgent<B>(back_end: &mut B) -> Result<Publisher<Publication>, RosError>
-where
-    B: Publishes<FeatureArray>
-        + Publishes<MarkerArray>
-        + Publishes<Path>
-        + Publishes<ProbeResult>
-        + Publishes<HapticMismatch>
-        + Publishes<DiagnosticArray>,
-{
-    let (features, feature_markers) = (back_end.publisher(FEATURES)?, back_end.publisher(FEATURE_MARKERS)?);
-    let (tip, path, probe_results) =
-        (back_end.publisher(TIP)?, back_end.publisher(PATH)?, back_end.publisher(PROBE_RESULTS)?);
-    let (mismatch, diagnostics) = (back_end.publisher(MISMATCH)?, back_end.publisher(DIAGNOSTICS)?);
-    Ok(Box::new(move |publication| match publication {
-        Publication::Features(message) => features(message).now(),
-        Publication::FeatureMarkers(message) => feature_markers(message).now(),
-        Publication::Tip(message) => tip(message).now(),
-        Publication::Path(message) => path(message).now(),
-        Publication::ProbeResult(message) => probe_results(*message).now(),
-        Publication::Mismatch(message) => mismatch(message).now(),
-        Publication::Diagnostics(message) => diagnostics(message).now(),
-        // what may wait has a send queue of its own
-        Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => Sent::Done,
-    }))
+/// Announces topics; what sends their messages, or gives back what a slow listener holds up.
+macro_rules! publishers {
+    ($(#[$doc:meta])* fn $announce:ident; $($send:ident: $publication:ident($message:ident) on $topic:expr;)+) => {
+        $(#[$doc])*
+        pub(super) fn $announce<B>(back_end: &mut B) -> Result<Publisher<Publication>, RosError>
+        where
+            $(B: Publishes<$message>,)+
+        {
+            $(let $send = Publishes::<$message>::publisher(back_end, $topic)?;)+
+            Ok(Box::new(move |publication| match publication {
+                $(Publication::$publication(message) => $send(message).map(Publication::$publication),)+
+                // the others have a send queue of their own
+                _ => Sent::Done,
+            }))
+        }
+    };
 }
 
-/// Announces the topics of what is large and may wait; what sends it, or gives back what a slow listener holds up.
-pub(super) fn mesh<B>(back_end: &mut B) -> Result<Publisher<Publication>, RosError>
-where
-    B: Publishes<Marker> + Publishes<MeshPatch> + Publishes<ProbeTouch>,
-{
-    let (tiles, patches) = (back_end.publisher(MESH)?, back_end.publisher(MESH_PATCH)?);
-    let probe_touches = back_end.publisher(PROBE_TOUCHES)?;
-    Ok(Box::new(move |publication| match publication {
-        Publication::Tile(message) => tiles(message).or_later(Publication::Tile),
-        Publication::MeshPatch(message) => patches(message).or_later(Publication::MeshPatch),
-        Publication::ProbeTouch(message) => {
-            probe_touches(*message).or_later(|message| Publication::ProbeTouch(Box::new(message)))
-        }
-        // the others have a send queue of their own
-        _ => Sent::Done,
-    }))
+publishers! {
+    /// What is small and urgent, and waits for nobody.
+    fn urgent;
+    features: Features(FeatureArray) on Topic::latched("features", 1);
+    feature_markers: FeatureMarkers(MarkerArray) on Topic::latched("feature_markers", 1);
+    tip: Tip(MarkerArray) on Topic::reliable("tip", 1);
+    path: Path(Path) on Topic::latched("path", 1);
+    probe_results: ProbeResult(ProbeResult) on Topic::reliable("probe_results", 100);
+    mismatch: Mismatch(HapticMismatch) on Topic::best_effort("mismatch", 100);
+    diagnostics: Diagnostics(DiagnosticArray) on Topic::reliable("/diagnostics", 10);
+}
+
+publishers! {
+    /// What is large and may wait.
+    fn mesh;
+    tiles: Tile(Marker) on MESH;
+    patches: MeshPatch(MeshPatch) on MESH_PATCH;
+    probe_touches: ProbeTouch(ProbeTouch) on PROBE_TOUCHES;
 }
 
 /// Everything that is listened to.
@@ -140,33 +126,44 @@ where
 mod tests {
     use super::*;
 
+    #[derive(Default)]
+    struct Announced(Vec<Topic>);
+
+    impl<M> Publishes<M> for Announced {
+        fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
+            self.0.push(topic);
+            Ok(Box::new(|_| Sent::Done))
+        }
+    }
+
     #[test]
     fn the_quality_of_service_is_that_of_the_documentation() {
         let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
         let (_, table) = text.split_once("| topic | type | reliability |").unwrap();
-        let documented = table.lines().skip(2).take_while(|line| line.starts_with('|')).map(|line| {
-            let cells: Vec<_> =
-                line.trim_matches('|').split('|').map(|cell| cell.replace('`', "").trim().into()).collect();
-            let [name, _, reliability, durability, depth, _]: [String; 6] = cells.try_into().unwrap();
-            [name, reliability, durability, depth]
-        });
-        let published = [
-            MESH,
-            MESH_PATCH,
-            FEATURES,
-            FEATURE_MARKERS,
-            TIP,
-            PATH,
-            PROBE_RESULTS,
-            PROBE_TOUCHES,
-            MISMATCH,
-            DIAGNOSTICS,
-        ];
-        let here = published.map(|Topic { name, is_reliable, is_latched, depth }| {
-            let reliability = if is_reliable { "reliable" } else { "best effort" };
-            let durability = if is_latched { "transient local" } else { "volatile" };
-            [name.to_owned(), reliability.to_owned(), durability.to_owned(), depth.to_string()]
-        });
-        assert_eq!(here.to_vec(), documented.collect::<Vec<_>>());
+        let mut documented: Vec<_> = table
+            .lines()
+            .skip(2)
+            .take_while(|line| line.starts_with('|'))
+            .map(|line| {
+                let cells: Vec<_> =
+                    line.trim_matches('|').split('|').map(|cell| cell.replace('`', "").trim().into()).collect();
+                let [name, _, reliability, durability, depth, _]: [String; 6] = cells.try_into().unwrap();
+                [name, reliability, durability, depth]
+            })
+            .collect();
+        let mut published = Announced::default();
+        drop(urgent(&mut published).and(mesh(&mut published)).unwrap());
+        let mut here: Vec<_> = published
+            .0
+            .into_iter()
+            .map(|Topic { name, is_reliable, is_latched, depth }| {
+                let reliability = if is_reliable { "reliable" } else { "best effort" };
+                let durability = if is_latched { "transient local" } else { "volatile" };
+                [name.to_owned(), reliability.to_owned(), durability.to_owned(), depth.to_string()]
+            })
+            .collect();
+        here.sort();
+        documented.sort();
+        assert_eq!(here, documented);
     }
 }

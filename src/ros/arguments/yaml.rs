@@ -103,14 +103,6 @@ impl<'de> Visitor<'de> for PieceVisitor {
         Ok(YamlPiece::Nothing)
     }
 
-    fn visit_none<E>(self) -> Result<YamlPiece, E> {
-        Ok(YamlPiece::Nothing)
-    }
-
-    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<YamlPiece, D::Error> {
-        deserializer.deserialize_any(self)
-    }
-
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<YamlPiece, A::Error> {
         while items.next_element::<YamlPiece>()?.is_some() {}
         Ok(YamlPiece::List)

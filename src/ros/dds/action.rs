@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -14,18 +15,18 @@ use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatus, GoalStatusArr
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::qos::{Durability, History};
-use ros2_client::{ActionServer, ActionTypeName, RmwRequestId};
+use ros2_client::{ActionServer, ActionTypeName, RmwRequestId, WriteError};
 
 use super::answers::Room;
 use super::back_end::{DdsBackEnd, During};
 use super::graph::mapping;
-use super::incoming::Listener;
-use super::services::{SERVICE, unreadable};
+use super::incoming::{Listener, drain};
+use super::services::{OTHER_MAPPING, SERVICE};
 use super::topics::dds_name;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
-use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd, Reply};
+use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd, Reply};
 use crate::ros::services::PROBE;
 
 /// Goals that are remembered; of those that ended the oldest are forgotten first.
@@ -82,38 +83,19 @@ pub(super) fn server(back_end: &mut DdsBackEnd<'_>) -> Result<Box<dyn Listener>,
 }
 
 impl Listener for Arc<ProbeAction> {
-    fn sources(&self) -> usize {
-        3
-    }
-
-    fn source(&mut self, number: usize) -> &mut dyn Source {
+    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
         let probe = Self::get_mut(self).expect("sources are asked for before any goal is there");
-        match number {
-            0 => probe.server.goal_server(),
-            1 => probe.server.cancel_server(),
-            _ => probe.server.result_server(),
-        }
+        each(probe.server.goal_server())?;
+        each(probe.server.cancel_server())?;
+        each(probe.server.result_server())
     }
 
     fn take(&mut self) {
-        let probe = &*self;
-        drain(&probe.exchange, || probe.server.receive_goal(), |id, request| probe.ask(id, request));
-        drain(&probe.exchange, || probe.server.receive_cancel_request(), |id, request| probe.cancel(id, &request));
-        drain(&probe.exchange, || probe.server.receive_result_request(), |id, r| probe.wait_for(id, r.goal_id));
-    }
-}
-
-fn drain<T>(
-    exchange: &Exchange,
-    receive: impl Fn() -> ros2_client::ReadResult<Option<(RmwRequestId, T)>>,
-    take: impl Fn(RmwRequestId, T),
-) {
-    loop {
-        match receive() {
-            Ok(Some((id, request))) => take(id, request),
-            Ok(None) => return,
-            Err(error) => unreadable(PROBE, exchange, &error),
-        }
+        let (probe, ProbeAction { server, exchange, .. }) = (&*self, &**self);
+        let what = (PROBE, exchange, OTHER_MAPPING);
+        drain(what, || server.receive_goal(), |(id, request)| probe.ask(id, request));
+        drain(what, || server.receive_cancel_request(), |(id, request)| probe.cancel(id, &request));
+        drain(what, || server.receive_result_request(), |(id, request)| probe.wait_for(id, request.goal_id));
     }
 }
 
@@ -122,6 +104,18 @@ impl ProbeAction {
     fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
         let probe = self.clone();
         self.exchange.urgent.answer(Box::new(move || send(&probe)));
+    }
+
+    /// Answers a call, and publishes what has become of the goals.
+    fn answer(
+        self: &Arc<Self>,
+        service: &'static str,
+        send: impl FnOnce(&ProbeServer) -> Result<(), WriteError<()>> + Send + 'static,
+    ) {
+        self.later(move |probe| {
+            report(service, send(&probe.server));
+            probe.publish_status();
+        });
     }
 
     /// A new goal: the node decides.
@@ -146,23 +140,21 @@ impl ProbeAction {
             result: Reply::new(move |(end, response)| for_result.end(id, end, response)),
             is_cancelled,
         };
-        self.exchange.arrivals.put(Arrival::Call(Call::Probe(request.goal, goal)));
+        self.exchange.call(Call::Arm(ArmOrder::Goal(request.goal, goal)));
     }
 
     fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {
         let stamp = Time::now();
-        if accepted {
-            if let Some(known) = locked(&self.goals).known.get_mut(&id) {
-                known.status = GoalStatusEnum::Executing;
-                known.accepted = stamp;
-            }
-        } else {
-            locked(&self.goals).refuse(id);
+        let mut goals = locked(&self.goals);
+        match goals.known.get_mut(&id) {
+            Some(known) if accepted => (known.status, known.accepted) = (GoalStatusEnum::Executing, stamp),
+            // forgets one that was not taken up
+            Some(known) if known.accepted == Time::ZERO => drop(goals.known.remove(&id)),
+            _ => {}
         }
-        self.later(move |probe| {
-            report("send_goal", probe.server.send_goal_response(request_id, SendGoalResponse { accepted, stamp }));
-            probe.publish_status();
-        });
+        drop(goals);
+        let answer = SendGoalResponse { accepted, stamp };
+        self.answer("send_goal", move |server| server.send_goal_response(request_id, answer));
     }
 
     fn end(self: &Arc<Self>, id: GoalId, end: GoalEnd, response: ProbeResponse) {
@@ -171,14 +163,11 @@ impl ProbeAction {
             GoalEnd::Canceled => GoalStatusEnum::Canceled,
             GoalEnd::Aborted => GoalStatusEnum::Aborted,
         };
-        let waiting = match locked(&self.goals).known.get_mut(&id) {
-            Some(known) => {
-                known.status = status;
-                known.result = Some(response.clone());
-                std::mem::take(&mut known.waiting)
-            }
-            None => return,
-        };
+        let mut goals = locked(&self.goals);
+        let Some(known) = goals.known.get_mut(&id) else { return };
+        (known.status, known.result) = (status, Some(response.clone()));
+        let waiting = std::mem::take(&mut known.waiting);
+        drop(goals);
         self.later(move |probe| {
             for request_id in waiting {
                 probe.send_result(request_id, status, response.clone());
@@ -208,10 +197,7 @@ impl ProbeAction {
     /// Somebody wants goals stopped; the node does it when it can.
     fn cancel(self: &Arc<Self>, request_id: RmwRequestId, request: &CancelGoalRequest) {
         let response = locked(&self.goals).cancel(wanted(request));
-        self.later(move |probe| {
-            report("cancel_goal", probe.server.send_cancel_response(request_id, response));
-            probe.publish_status();
-        });
+        self.answer("cancel_goal", move |server| server.send_cancel_response(request_id, response));
     }
 
     fn publish_status(&self) {
@@ -226,7 +212,7 @@ impl ProbeAction {
     }
 }
 
-fn report(service: &str, sent: Result<(), ros2_client::WriteError<()>>) {
+fn report(service: &str, sent: Result<(), WriteError<()>>) {
     if let Err(error) = sent {
         tracing::warn!(service, %error, "an answer is not sent");
     }
@@ -268,13 +254,6 @@ impl Goals {
         self.known.get(&id).is_some_and(|known| !known.is_over())
     }
 
-    /// Forgets one that was not taken up.
-    fn refuse(&mut self, id: GoalId) {
-        if self.known.get(&id).is_some_and(|known| known.accepted == Time::ZERO) {
-            self.known.remove(&id);
-        }
-    }
-
     /// As `CancelGoal` says: one goal, all up to a moment, both, or all.
     fn cancel(&mut self, (uuid, until_ns): ([u8; 16], i64)) -> CancelGoalResponse {
         let is_named = |id: &GoalId| *id.uuid.as_bytes() == uuid;
@@ -282,8 +261,8 @@ impl Goals {
         let all = !names_one && until_ns == 0;
         let mut goals_canceling = Vec::new();
         for (id, known) in self.known.iter_mut().filter(|(_, known)| !known.is_over()) {
-            let stamp = &known.accepted;
-            if all || (names_one && is_named(id)) || (until_ns > 0 && stamp.to_nanos() <= until_ns) {
+            let is_before = until_ns > 0 && known.accepted.to_nanos() <= until_ns;
+            if all || (names_one && is_named(id)) || is_before {
                 known.is_cancelled.store(true, Ordering::Relaxed);
                 known.status = GoalStatusEnum::Canceling;
                 goals_canceling.push(GoalInfo { goal_id: *id, stamp: known.accepted });

@@ -95,6 +95,9 @@ pub(super) fn size(answer: &impl ros2_client::Message) -> usize {
 /// Shortens a text by so many bytes at least, as far as it has them.
 fn cut(text: &mut String, by: usize) {
     const MORE: &str = " …";
+    if by == 0 {
+        return;
+    }
     let mut end = text.len().saturating_sub(by + MORE.len());
     while !text.is_char_boundary(end) {
         end -= 1;
@@ -113,19 +116,13 @@ fn excess(answer: &impl ros2_client::Message, most: usize) -> usize {
 
 /// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least first.
 macro_rules! texts {
-    ($($answer:ty: $($field:ident).+ $(, $($then:ident).+)*;)+) => {
+    ($($answer:ty: $($($field:ident).+),+;)+) => {
         $(impl Shrinkable for $answer {
             fn reduce(&mut self, most: usize) {
-                texts!(@cut self, most, $($field).+);
-                $(texts!(@cut self, most, $($then).+);)*
+                $(let too_many = excess(self, most);
+                cut(&mut self.$($field).+, too_many);)+
             }
         })+
-    };
-    (@cut $self:ident, $most:ident, $($field:ident).+) => {
-        let excess = excess($self, $most);
-        if excess > 0 {
-            cut(&mut $self.$($field).+, excess);
-        }
     };
 }
 

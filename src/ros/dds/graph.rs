@@ -1,6 +1,7 @@
 //! Who else is on our topics, and why somebody who is does not fit.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,10 +35,10 @@ pub(super) struct DdsGraph {
     mapping: ServiceMapping,
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
-    names: BTreeMap<String, (String, String)>,
+    topics: BTreeMap<String, (String, String)>,
     /// ROS names of our services
     pub services: Vec<String>,
-    /// our readers and writers: name in DDS, and who is matched
+    /// our readers and writers: ROS name of the topic, and who is matched
     matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
     /// what others call services with: the service in ROS, and what is so once both sides know each other
     callers: BTreeMap<GUID, (String, &'static str)>,
@@ -63,7 +64,7 @@ impl DdsGraph {
             exchange: exchange.clone(),
             mapping: mapping(config),
             own: participant.guid(),
-            names: BTreeMap::new(),
+            topics: BTreeMap::new(),
             services: Vec::new(),
             matched: BTreeMap::new(),
             callers: BTreeMap::new(),
@@ -73,14 +74,15 @@ impl DdsGraph {
         }
     }
 
-    /// A topic of ours, and what it is called in ROS.
-    pub fn name(&mut self, topic: &Topic, whole: String) {
-        self.names.insert(topic.name(), (whole, topic.get_type().name().to_owned()));
+    /// A reader or writer of ours, and what its topic is called in ROS.
+    pub fn add(&mut self, guid: GUID, topic: &Topic, name: String) {
+        self.topics.insert(topic.name(), (name.clone(), topic.get_type().name().to_owned()));
+        self.matched.insert(guid, (name, BTreeSet::new()));
     }
 
-    /// A reader or writer of ours.
-    pub fn add(&mut self, guid: GUID, topic: &Topic) {
-        self.matched.insert(guid, (topic.name(), BTreeSet::new()));
+    /// How often it looks who is silent, where anybody may be.
+    pub fn look_every(&self) -> Option<Duration> {
+        self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 
     fn on(&mut self, event: Event) {
@@ -160,11 +162,12 @@ impl DdsGraph {
                 self.callers.extend(service.map(|service| (guid, (service.to_owned(), what))));
             }
         }
-        if let Some((name, ours)) = self.names.get(topic) {
+        if let Some((name, ours)) = self.topics.get(topic) {
             if ours != type_name && self.reported.insert(guid) {
                 let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
-                let (name, count) = (name.clone(), self.count(topic));
-                self.exchange.arrivals.report(name, count, Some(reason));
+                let of_topic = self.matched.values().filter(|(own, _)| own == name);
+                let count = of_topic.map(|(_, others)| others.len()).sum();
+                self.exchange.arrivals.report(name.clone(), count, Some(reason));
             }
             return;
         }
@@ -184,14 +187,10 @@ impl DdsGraph {
         }
     }
 
-    fn count(&self, topic: &str) -> usize {
-        self.matched.values().filter(|(name, _)| name == topic).map(|(_, others)| others.len()).sum()
-    }
-
     fn report(&self, local: GUID, mismatch: Option<String>) {
-        let Some((topic, others)) = self.matched.get(&local) else { return };
-        let name = self.names.get(topic).map_or_else(|| topic.clone(), |(name, _)| name.clone());
-        self.exchange.arrivals.report(name, others.len(), mismatch);
+        if let Some((name, others)) = self.matched.get(&local) {
+            self.exchange.arrivals.report(name.clone(), others.len(), mismatch);
+        }
     }
 }
 
@@ -216,15 +215,9 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
 }
 
 impl Listener for DdsGraph {
-    fn source(&mut self, number: usize) -> &mut dyn Source {
-        match &mut self.keep_alive {
-            Some(keep_alive) if number > 0 => keep_alive.source(),
-            _ => self.listener.as_status_source_mio1(),
-        }
-    }
-
-    fn sources(&self) -> usize {
-        1 + usize::from(self.keep_alive.is_some())
+    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+        each(self.listener.as_status_source_mio1())?;
+        self.keep_alive.iter_mut().try_for_each(|keep_alive| each(&mut keep_alive.socket))
     }
 
     fn take(&mut self) {
@@ -234,9 +227,6 @@ impl Listener for DdsGraph {
         if let Some(keep_alive) = &mut self.keep_alive {
             keep_alive.take();
         }
-    }
-    fn look_every(&self) -> Option<Duration> {
-        self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 }
 

@@ -1,6 +1,7 @@
 //! One thread takes everything that comes.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token, Waker};
-use ros2_client::{Gid, Subscription};
+use ros2_client::{Gid, ReadResult, Subscription};
 
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
@@ -16,48 +17,37 @@ use crate::ros::port::Arrival;
 
 /// Something that messages come from.
 pub(super) trait Listener: Send {
-    /// What wakes the thread: once for all that came since it was last read empty. Asked for once for each number below
-    /// [`Self::sources`].
-    fn source(&mut self, number: usize) -> &mut dyn Source;
-
-    /// How many sources there are.
-    fn sources(&self) -> usize {
-        1
-    }
+    /// Gives out what wakes the thread, once for all that came since it was last read empty. Asked for once, before anything is taken.
+    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()>;
 
     /// Takes all that is there.
     fn take(&mut self);
-
-    /// How long it may go without being asked for what is there; `None` where only what comes counts.
-    fn look_every(&self) -> Option<Duration> {
-        None
-    }
 }
 
 /// Not the number of any listener.
 const WAKE: Token = Token(usize::MAX);
 
 /// Starts the thread; the waker lets it look whether all is over.
+///
+/// - `look_every`: how long listeners may go without being asked for what is there; `None` where only what comes counts.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
+    look_every: Option<Duration>,
     exchange: &Arc<Exchange>,
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
-        for number in 0..listener.sources() {
-            poll.registry().register(listener.source(number), Token(token), Interest::READABLE)?;
-        }
+        listener.sources(&mut |source| poll.registry().register(source, Token(token), Interest::READABLE))?;
     }
     let waker = Arc::new(Waker::new(poll.registry(), WAKE)?);
     let thread = exchange.thread("touchup-receive", move |exchange| {
         let mut events = Events::with_capacity(128);
         // what came before the registration wakes nobody
         listeners.iter_mut().for_each(|listener| listener.take());
-        let look_every = listeners.iter().filter_map(|listener| listener.look_every()).min();
         let mut looked = Instant::now();
         while !exchange.arrivals.is_over() {
             if let Err(error) = poll.poll(&mut events, look_every) {
-                if error.kind() == std::io::ErrorKind::Interrupted {
+                if error.kind() == io::ErrorKind::Interrupted {
                     continue;
                 }
                 tracing::error!(%error, "the node hears nothing any more");
@@ -71,14 +61,26 @@ pub(super) fn listen(
             }
             if look_every.is_some_and(|every| looked.elapsed() >= every) {
                 looked = Instant::now();
-                listeners
-                    .iter_mut()
-                    .filter(|listener| listener.look_every().is_some())
-                    .for_each(|listener| listener.take());
+                listeners.iter_mut().for_each(|listener| listener.take());
             }
         }
     })?;
     Ok((waker, thread))
+}
+
+/// Takes all that is there of what has this name; what cannot be read is reported with a remark behind the reason.
+pub(super) fn drain<T>(
+    (name, exchange, remark): (&'static str, &Arc<Exchange>, &str),
+    mut receive: impl FnMut() -> ReadResult<Option<T>>,
+    mut take: impl FnMut(T),
+) {
+    loop {
+        match receive() {
+            Ok(Some(message)) => take(message),
+            Ok(None) => return,
+            Err(error) => drop(exchange.arrivals.put(Arrival::Unreadable(name, format!("{error}{remark}")))),
+        }
+    }
 }
 
 /// The last number of each sender.
@@ -114,24 +116,23 @@ pub(super) struct HeardTopic<M: RosMessage> {
 }
 
 impl<M: RosMessage> Listener for HeardTopic<M> {
-    fn source(&mut self, _: usize) -> &mut dyn Source {
-        &mut self.subscription
+    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+        each(&mut self.subscription)
     }
 
     fn take(&mut self) {
-        loop {
-            match self.subscription.take() {
-                Ok(Some((message, info))) => {
-                    if let Some(counter) = self.counter {
-                        let lost = self.numbers.missing(info.publisher_gid(), info.sequence_number());
-                        self.exchange.lost[counter].fetch_add(lost, Ordering::Relaxed);
-                    }
-                    self.exchange.arrivals.put((self.arrival)(&self.exchange, message));
+        let Self { name, subscription, exchange, arrival, counter, numbers } = self;
+        drain(
+            (name, exchange, ""),
+            || subscription.take(),
+            |(message, info)| {
+                if let Some(counter) = *counter {
+                    let lost = numbers.missing(info.publisher_gid(), info.sequence_number());
+                    exchange.lost[counter].fetch_add(lost, Ordering::Relaxed);
                 }
-                Ok(None) => return,
-                Err(error) => self.exchange.arrivals.put(Arrival::Unreadable(self.name, error.to_string())),
-            }
-        }
+                exchange.arrivals.put(arrival(exchange, message));
+            },
+        );
     }
 }
 

@@ -11,7 +11,6 @@ use std::io::{Error, ErrorKind, Result};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::mio1::net::UdpSocket as MioSocket;
 use socket2::{Domain, Protocol, Socket, Type};
 
@@ -23,10 +22,10 @@ pub(super) const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// Where participants announce themselves (RTPS 2.5, 9.6.2.4.1).
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// Ports of the first domain, and from one domain and one participant to the next (RTPS 2.5, 9.6.2.3).
-const MULTICAST_PORT: u16 = 7400;
-const UNICAST_PORT: u16 = 7410;
-const PORTS_OF_A_DOMAIN: u16 = 250;
-const PORTS_OF_A_PARTICIPANT: u16 = 2;
+const MULTICAST_PORT: u32 = 7400;
+const UNICAST_PORT: u32 = 7410;
+const PORTS_OF_A_DOMAIN: u32 = 250;
+const PORTS_OF_A_PARTICIPANT: u32 = 2;
 /// Participants that are remembered; a domain holds 120.
 const MOST_PARTICIPANTS: usize = 1024;
 /// No datagram is larger.
@@ -39,7 +38,8 @@ type Prefix = [u8; 12];
 
 /// The participants of a domain, by what they announce.
 pub(super) struct KeepAlive {
-    socket: MioSocket,
+    /// wakes who takes
+    pub socket: MioSocket,
     /// where our own participant listens
     own_port: u16,
     known: BTreeMap<Prefix, KnownParticipant>,
@@ -85,13 +85,12 @@ impl KeepAlive {
     /// # Errors
     /// Those of the system, when the port cannot be shared.
     pub fn new(domain_id: u16, participant_id: u16) -> Result<Self> {
-        let port = |first: u16| domain_id.checked_mul(PORTS_OF_A_DOMAIN).and_then(|offset| offset.checked_add(first));
-        let own_port = port(UNICAST_PORT)
-            .zip(participant_id.checked_mul(PORTS_OF_A_PARTICIPANT))
-            .and_then(|(port, offset)| port.checked_add(offset));
-        let (port, own_port) = port(MULTICAST_PORT)
-            .zip(own_port)
-            .ok_or_else(|| Error::new(ErrorKind::InvalidInput, "this domain has no such port"))?;
+        let offset = u32::from(domain_id) * PORTS_OF_A_DOMAIN;
+        let own_offset = offset + u32::from(participant_id) * PORTS_OF_A_PARTICIPANT;
+        let ports = [MULTICAST_PORT + offset, UNICAST_PORT + own_offset].map(u16::try_from);
+        let [Ok(port), Ok(own_port)] = ports else {
+            return Err(Error::new(ErrorKind::InvalidInput, "this domain has no such port"));
+        };
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
         socket.set_reuse_address(true)?;
         socket.set_reuse_port(true)?;
@@ -103,10 +102,6 @@ impl KeepAlive {
         }
         let socket = MioSocket::from_std(socket.into());
         Ok(Self { socket, own_port, known: BTreeMap::new(), datagram: vec![0; LARGEST_DATAGRAM] })
-    }
-
-    pub fn source(&mut self) -> &mut dyn Source {
-        &mut self.socket
     }
 
     /// RustDDS has waited for it in vain.

@@ -24,7 +24,7 @@ use self::back_end::{DdsBackEnd, join};
 use self::graph::{DdsGraph, mapping};
 use super::arguments::NodeConfig;
 use super::exchange::{self, Exchange, Joined, RosError};
-use super::parameter_services;
+use super::parameter_services::{self, PublicParameters};
 use super::parameters::{PARAMETERS, ParameterValue, Parameters};
 use super::port::{Inbox, Port};
 use super::topics::{mesh, subscribe, urgent};
@@ -78,14 +78,15 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
             tracing::warn!(name, reason, "a change of a parameter is not announced");
         }
     };
-    parameter_services::serve(&mut back_end, &exchange, &config.parameters, Box::new(announce))?;
+    parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
     let probe = action::server(&mut back_end)?;
     let DdsBackEnd { node, graph, mut listeners, .. } = back_end;
     listeners.push(probe);
     let node = Arc::new(node);
     announcing.get_or_init(|| node.clone());
+    let look_every = graph.look_every();
     listeners.push(Box::new(graph));
-    let (waker, listening) = incoming::listen(listeners, &exchange)?;
+    let (waker, listening) = incoming::listen(listeners, look_every, &exchange)?;
     let mut threads = vec![listening];
     threads.extend(exchange.senders(urgent, mesh)?);
     let connection = DdsConnection { exchange: exchange.clone(), waker, threads, _node: node };

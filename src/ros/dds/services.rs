@@ -3,22 +3,23 @@
 //! In the enhanced mapping a server is that of ros2-client. In the mapping of CycloneDDS it is our own: that of ros2-client puts the
 //! identity of the request into the inline QoS there too, which nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
 
+use std::io;
 use std::sync::Arc;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::{QosPolicies, TopicKind};
 use ros2_client::qos::{History, QosProfile};
-use ros2_client::{Publisher, ReadError, ReadResult, RmwRequestId, ServiceMapping, ServiceTypeName, Subscription};
+use ros2_client::{Publisher, ReadResult, ServiceMapping, ServiceTypeName, Subscription};
 use serde::{Deserialize, Serialize};
 
 use super::answers::{Room, Shrinkable};
 use super::back_end::{DdsBackEnd, During};
 use super::graph::mapping;
-use super::incoming::Listener;
+use super::incoming::{Listener, drain};
 use super::topics::dds_name;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::*;
-use crate::ros::port::{Arrival, Reply};
+use crate::ros::port::Reply;
 use crate::ros::services::Serves;
 
 macro_rules! carried {
@@ -29,7 +30,7 @@ include!(concat!(env!("OUT_DIR"), "/carried.rs"));
 /// One service: what it is called, and what is done with a request.
 struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     name: &'static str,
-    server: Arc<Server<Q, A>>,
+    server: Server<Q, A>,
     exchange: Arc<Exchange>,
     room: Arc<Room>,
     call: Box<dyn FnMut(Q, Reply<A>) + Send>,
@@ -37,33 +38,33 @@ struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'sta
 
 impl<Q, A> Listener for Service<Q, A>
 where
-    Q: ros2_client::Message + Send + Sync + 'static,
+    Q: ros2_client::Message + Clone + Send + Sync + 'static,
     A: Shrinkable + Send + Sync + 'static,
 {
-    fn source(&mut self, _: usize) -> &mut dyn Source {
-        Arc::get_mut(&mut self.server).expect("sources are asked for before any request is answered").source()
+    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+        match &mut self.server {
+            Server::Enhanced(server) => {
+                each(Arc::get_mut(server).expect("sources are asked for before any request is answered"))
+            }
+            Server::Cyclone(requests, _) => each(&mut **requests),
+        }
     }
 
     fn take(&mut self) {
-        loop {
-            match self.server.take() {
-                Ok(Some((id, request))) => {
-                    let (name, server, room) = (self.name, self.server.clone(), self.room.clone());
-                    let send = move |answer| server.send(id, room.fit(name, answer));
-                    (self.call)(request, self.exchange.reply(name, send));
-                }
-                Ok(None) => return,
-                Err(error) => unreadable(self.name, &self.exchange, &error),
-            }
-        }
+        let Self { name, server, exchange, room, call } = self;
+        drain(
+            (name, exchange, OTHER_MAPPING),
+            || server.take(),
+            |(request, send)| {
+                let (name, room) = (*name, room.clone());
+                call(request, exchange.reply(name, move |answer| send(room.fit(name, answer))));
+            },
+        );
     }
 }
 
 /// A request that cannot be read is most often one with another header.
-pub(super) fn unreadable(name: &'static str, exchange: &Exchange, error: &ReadError) {
-    let reason = format!("{error}; has the caller another service_mapping?");
-    exchange.arrivals.put(Arrival::Unreadable(name, reason));
-}
+pub(super) const OTHER_MAPPING: &str = "; has the caller another service_mapping?";
 
 impl<S> Serves<S> for DdsBackEnd<'_>
 where
@@ -75,7 +76,7 @@ where
         call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<(), RosError> {
         let server = Server::<S::Request, S::Response>::new(self, name, S::TYPE_NAME);
-        let (server, exchange, room) = (Arc::new(server?), self.exchange.clone(), self.room.clone());
+        let (server, exchange, room) = (server?, self.exchange.clone(), self.room.clone());
         self.names.push(self.config.resolve(name)?);
         self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
         Ok(())
@@ -95,23 +96,19 @@ struct Headed<M> {
 
 impl<M: ros2_client::Message> ros2_client::Message for Headed<M> {}
 
-/// Which call is answered.
-#[derive(Clone, Copy)]
-enum CallId {
-    Enhanced(RmwRequestId),
-    Cyclone { caller: u64, number: i64 },
-}
+/// Sends the answer to one request.
+type SendAnswer<A> = Box<dyn FnOnce(A) -> Result<(), String> + Send>;
 
-/// Takes requests and sends answers.
+/// Takes requests.
 enum Server<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
-    Enhanced(ros2_client::Server<Q, A>),
-    Cyclone(Subscription<Headed<Q>>, Publisher<Headed<A>>),
+    Enhanced(Arc<ros2_client::Server<Q, A>>),
+    Cyclone(Box<Subscription<Headed<Q>>>, Arc<Publisher<Headed<A>>>),
 }
 
 impl<Q, A> Server<Q, A>
 where
-    Q: ros2_client::Message + Clone + 'static,
-    A: ros2_client::Message + 'static,
+    Q: ros2_client::Message + Clone + Send + Sync + 'static,
+    A: ros2_client::Message + Send + Sync + 'static,
 {
     /// - `name`: as in docs/ros.md
     fn new(back_end: &mut DdsBackEnd<'_>, name: &str, [package, type_name]: [&str; 2]) -> Result<Self, RosError> {
@@ -120,7 +117,7 @@ where
         if mapping != ServiceMapping::Cyclone {
             let type_name = ServiceTypeName::new(package, type_name);
             let server = node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
-            return server.map(Self::Enhanced).during("offering a service");
+            return server.map(|server| Self::Enhanced(Arc::new(server))).during("offering a service");
         }
         let topic = |name: String, part: &str| {
             let type_name = format!("{package}::srv::dds_::{type_name}_{part}_");
@@ -131,38 +128,23 @@ where
         let answers = topic(format!("rr{whole}Reply"), "Response")?;
         let requests = node.create_subscription(&requests, Some(SERVICE)).during("offering a service")?;
         let answers = node.create_publisher(&answers, Some(SERVICE)).during("offering a service")?;
-        Ok(Self::Cyclone(requests, answers))
+        Ok(Self::Cyclone(Box::new(requests), Arc::new(answers)))
     }
-}
-
-impl<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> Server<Q, A> {
-    fn source(&mut self) -> &mut dyn Source {
-        match self {
-            Self::Enhanced(server) => server,
-            Self::Cyclone(requests, _) => requests,
-        }
-    }
-
-    /// The next request that has come.
-    fn take(&self) -> ReadResult<Option<(CallId, Q)>> {
+    /// The next request that has come, and what answers it.
+    fn take(&self) -> ReadResult<Option<(Q, SendAnswer<A>)>> {
         Ok(match self {
-            Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| (CallId::Enhanced(id), request)),
-            Self::Cyclone(requests, _) => requests
-                .take()?
-                .map(|(Headed { caller, number, message }, _)| (CallId::Cyclone { caller, number }, message)),
+            Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| {
+                let server = server.clone();
+                let send = move |answer| server.send_response(id, answer).map_err(|error| error.to_string());
+                (request, Box::new(send) as SendAnswer<A>)
+            }),
+            Self::Cyclone(requests, answers) => requests.take()?.map(|(Headed { caller, number, message }, _)| {
+                let answers = answers.clone();
+                let send = move |message| {
+                    answers.publish(Headed { caller, number, message }).map_err(|error| error.to_string())
+                };
+                (message, Box::new(send) as SendAnswer<A>)
+            }),
         })
-    }
-
-    /// Answers one; an id of the other mapping there is none.
-    fn send(&self, id: CallId, message: A) -> Result<(), String> {
-        match (self, id) {
-            (Self::Enhanced(server), CallId::Enhanced(id)) => {
-                server.send_response(id, message).map_err(|error| error.to_string())
-            }
-            (Self::Cyclone(_, answers), CallId::Cyclone { caller, number }) => {
-                answers.publish(Headed { caller, number, message }).map_err(|error| error.to_string())
-            }
-            _ => Err("it was asked in another mapping".to_owned()),
-        }
     }
 }

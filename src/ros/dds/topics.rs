@@ -43,24 +43,15 @@ fn limit(topic: Topic) -> Option<usize> {
     [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)].into_iter().find(|(one, _)| *one == topic).map(|(_, most)| most)
 }
 
-impl DdsBackEnd<'_> {
-    fn announce<M: RosMessage>(&mut self, name: &str, qos: &QosProfile) -> Result<rustdds::Topic, RosError> {
-        let whole = self.config.resolve(name)?;
-        let topic = make_topic::<M>(&self.node, &whole, qos)?;
-        self.graph.name(&topic, whole);
-        Ok(topic)
-    }
-}
-
 impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
-        let profile = profile(topic);
-        let mut announced = self.announce::<M>(topic.name, &profile)?;
+        let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
+        let mut announced = make_topic::<M>(&self.node, &whole, &profile)?;
         if let Some(most) = limit(topic) {
             announced = limited(&announced, most)?;
         }
         let publisher = self.node.create_publisher::<M>(&announced, Some(profile)).during("publishing a topic")?;
-        self.graph.add(publisher.guid(), &announced);
+        self.graph.add(publisher.guid(), &announced, whole);
         if topic == MESH {
             self.graph.tiles = Some(publisher.guid());
         }
@@ -77,11 +68,11 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
 
 impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
-        let profile = profile(topic);
-        let announced = self.announce::<M>(topic.name, &profile)?;
+        let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
+        let announced = make_topic::<M>(&self.node, &whole, &profile)?;
         let subscription = self.node.create_subscription::<M>(&announced, Some(profile));
         let subscription = subscription.during("subscribing to a topic")?;
-        self.graph.add(subscription.guid(), &announced);
+        self.graph.add(subscription.guid(), &announced, whole);
         let counter = ["wrench", "pose"].iter().position(|sample| topic.name.ends_with(sample));
         let (name, exchange, numbers) = (topic.name, self.exchange.clone(), LastNumbers::default());
         self.listeners.push(Box::new(HeardTopic { name, subscription, exchange, arrival, counter, numbers }));

@@ -1,31 +1,30 @@
 //! What the node does when it is asked.
 
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use nalgebra::Point3;
 use tracing::warn;
 
-use super::arm::ArmInput;
-use super::channels::{FeatureInput, FlaggedPlace, ViewInput};
-use super::convert::{header, point_of, stamp_ns};
+use super::arm::refuse;
+use super::channels::{FeatureInput, ViewInput};
+use super::convert::{header, point_of, stamp_ns, trigger};
 use super::error::NodeError;
-use super::feature_messages::KIND_NAMES;
+use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
-use super::replica::{MeshVersion, Snapshot};
-use super::session::NodeSession;
-use super::setup::Setup;
+use super::replica::MeshVersion;
+use super::session::{NodeSession, ResultFiles};
+use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
-use crate::reconstruct::Patcher;
+use crate::probing::execute::Flag;
 use crate::ros::messages::{
     FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse, SaveMeshRequest,
-    SaveMeshResponse, SetBoolResponse, TriggerResponse, UndoRequest, UndoResponse,
+    SaveMeshResponse, SetBoolResponse, UndoRequest, UndoResponse,
 };
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Call, Endpoint, Reply};
-use crate::session::{OutcomePlaces, StrokeChange};
+use crate::session::StrokeChange;
 
 /// A flag may reach so far, m.
 const LARGEST_RADIUS: f64 = 1.0;
@@ -47,24 +46,30 @@ impl RefinementWorker {
             },
             Call::Unflag(request, reply) => self.ask_features(FeatureInput::Unflag(request.id, reply)),
             Call::Detect(request, reply) => self.ask_features(FeatureInput::Detect(request, reply)),
-            Call::Save(request, reply) => self.save(request, reply),
+            Call::Save(request, reply) => self.save(&request, reply),
             Call::Resync(_, reply) => self.resync(reply),
             Call::Undo(request, reply) => reply.send(self.change_strokes(&request, true)),
             Call::Redo(request, reply) => reply.send(self.change_strokes(&request, false)),
-            Call::Reset(reply) => reply.send(self.reset()),
+            Call::Reset(reply) => {
+                let begun = self.begin_again().map(|name| format!("begun again: session {name}"));
+                reply.send(trigger(begun.map_err(|error| error.to_string())));
+            }
             Call::Pause(request, reply) => {
                 self.is_paused = request.data;
-                self.arm.iter().for_each(|arm| arm.common.pause(request.data));
+                self.arm.iter().for_each(|arm| arm.common.is_paused.store(request.data, Ordering::Release));
                 let message = if request.data { "paused: samples are passed over" } else { "samples are taken" };
                 reply.send(SetBoolResponse { success: true, message: message.to_owned() });
             }
-            Call::ProbeFeature(request, reply) => self.order_arm(ArmInput::Feature(request, reply)),
-            Call::Probe(goal, handles) => self.order_arm(ArmInput::Goal(goal, handles)),
-            Call::ProbeAll(reply) => self.order_arm(ArmInput::All(reply)),
-            Call::Recover(reply) => self.order_arm(ArmInput::Recover(reply)),
+            Call::Arm(order) => {
+                let header = header(self.port.now_ns(), &self.setup.shared.frame);
+                match &self.arm {
+                    Some(arm) => arm.order(order, self.session.folder.path(), header),
+                    None => refuse(order, header, ProbeResult::NO_ARM, NO_ARM),
+                }
+            }
             Call::ArmState(reply) => reply.send(match &self.arm {
                 Some(arm) => arm.state(),
-                None => TriggerResponse { success: false, message: NO_ARM.to_owned() },
+                None => trigger(Err(NO_ARM.to_owned())),
             }),
         }
     }
@@ -75,14 +80,15 @@ impl RefinementWorker {
         }
     }
 
-    fn flag_of(&self, request: &FlagFeatureRequest) -> Result<FlaggedPlace, String> {
-        let given = if request.search_radius == 0.0 { self.flag_radius() } else { request.search_radius };
-        if !(given > 0.0 && given <= LARGEST_RADIUS) {
+    fn flag_of(&self, request: &FlagFeatureRequest) -> Result<Flag, String> {
+        let radius = if request.search_radius == 0.0 { self.flag_radius() } else { request.search_radius };
+        if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
             return Err(format!(
-                "search_radius is {given} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm"
+                "search_radius is {radius} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm"
             ));
         }
-        Ok(FlaggedPlace { kind: request.kind, point: self.point_in_object(&request.point)?, radius: given })
+        let place = self.point_in_object(&request.point)?;
+        Ok(Flag { id: 0, kind: kind_of(request.kind)?, place, radius })
     }
 
     fn flag_radius(&self) -> f64 {
@@ -103,11 +109,10 @@ impl RefinementWorker {
     /// RViz's Publish Point.
     pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
         let parameters = self.setup.shared.parameters();
-        let kind = KIND_NAMES.iter().position(|name| *name == parameters.string("flag_kind")).unwrap_or(0);
+        let kind = Kind::ALL.into_iter().find(|kind| kind.name() == parameters.string("flag_kind"));
         match self.point_in_object(clicked) {
-            Ok(point) => {
-                let flag = FlaggedPlace { kind: kind as u8, point, radius: self.flag_radius() };
-                self.ask_features(FeatureInput::Flag(flag, None));
+            Ok(place) => {
+                self.ask_features(FeatureInput::Flag(Flag { id: 0, kind, place, radius: self.flag_radius() }, None));
             }
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
@@ -157,13 +162,6 @@ impl RefinementWorker {
         UndoResponse { success: strokes > 0, message, strokes, mesh_version: self.session.version }
     }
 
-    fn reset(&mut self) -> TriggerResponse {
-        match self.begin_again() {
-            Ok(name) => TriggerResponse { success: true, message: format!("begun again: session {name}") },
-            Err(error) => TriggerResponse { success: false, message: error.to_string() },
-        }
-    }
-
     /// Ends the session beside the next one.
     fn begin_again(&mut self) -> Result<String, NodeError> {
         let next = NodeSession::begin(&self.setup)?;
@@ -195,47 +193,62 @@ impl RefinementWorker {
         }
     }
 
-    fn save(&mut self, request: SaveMeshRequest, reply: Reply<SaveMeshResponse>) {
-        if self.side_work.count() >= MOST_SAVING {
-            let message = format!("{MOST_SAVING} meshes are being saved: save again when they are done");
-            return reply.send(SaveMeshResponse { message, ..Default::default() });
-        }
-        let places = match SavedFiles::of(&self.session.folder, &request) {
-            Ok(places) => places,
-            Err(message) => return reply.send(SaveMeshResponse { message, ..Default::default() }),
-        };
-        let patcher = match self.session.engine.copy_patcher() {
-            Ok(patcher) => patcher,
-            Err(error) => return reply.send(SaveMeshResponse { message: error.to_string(), ..Default::default() }),
-        };
-        self.send_edits();
-        let snapshot = self.setup.shared.mesh.complete();
-        let (setup, version) = (Arc::clone(&self.setup), self.session.version);
-        let work = move || {
-            reply.send(match places.write(&setup, &snapshot, patcher) {
-                Ok(counts) => places.answer(version, counts),
-                Err(message) => SaveMeshResponse { message, ..Default::default() },
-            });
-        };
-        if let Err(error) = self.side_work.begin("save", work) {
-            warn!(%error, "no thread to save on: the caller gets no answer");
+    fn save(&mut self, request: &SaveMeshRequest, reply: Reply<SaveMeshResponse>) {
+        let refused = |message| SaveMeshResponse { message, ..Default::default() };
+        match self.saving(request) {
+            Ok(saved) => {
+                let work = move || reply.send(saved().unwrap_or_else(refused));
+                if let Err(error) = self.side_work.begin("save", work) {
+                    warn!(%error, "no thread to save on: the caller gets no answer");
+                }
+            }
+            Err(message) => reply.send(refused(message)),
         }
     }
 
-    /// Passes an order to the arm, or answers why it is not taken up.
-    fn order_arm(&self, input: ArmInput) {
-        let header = header(self.port.now_ns(), &self.setup.shared.frame);
-        match &self.arm {
-            Some(arm) => arm.order(input, self.session.folder.path(), header),
-            None => input.refuse(header, ProbeResult::NO_ARM, NO_ARM),
+    /// Writes what `touchup refine` would write of the samples so far, once it is called.
+    fn saving(
+        &mut self,
+        request: &SaveMeshRequest,
+    ) -> Result<impl FnOnce() -> Result<SaveMeshResponse, String> + Send + use<>, String> {
+        if self.side_work.count() >= MOST_SAVING {
+            return Err(format!("{MOST_SAVING} meshes are being saved: save again when they are done"));
         }
+        let files = files_of(&self.session.folder, request)?;
+        let patcher = self.session.engine.copy_patcher().map_err(|error| error.to_string())?;
+        self.send_edits();
+        let snapshot = self.setup.shared.mesh.complete();
+        let (setup, mesh_version) = (Arc::clone(&self.setup), self.session.version);
+        Ok(move || {
+            let late = |_| "mesh and touches were not complete in time: save again".to_owned();
+            let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT));
+            let patcher = patcher.transpose().map_err(late)?;
+            let refined = match patcher {
+                // all of it comes from scan and patch
+                Some(_) => None,
+                None => Some(setup.clock.recv_timeout(&snapshot, COPY_WAIT).map_err(late)?.mesh()),
+            };
+            let refined = refined.transpose().map_err(|why| why.to_string())?;
+            let outcome = files.write(&setup, refined.as_ref().unwrap_or(&setup.scan.0), patcher);
+            let [vertices, faces] = outcome.map_err(|why| why.to_string())?.counts;
+            let path = files.mesh.display().to_string();
+            Ok(SaveMeshResponse {
+                success: true,
+                message: format!("wrote {path}"),
+                path,
+                mesh_version,
+                vertex_count: vertices as u32,
+                face_count: faces as u32,
+            })
+        })
     }
 
     pub(super) fn set_parameter(&mut self, name: &str, value: &ParameterValue) -> Result<(), String> {
         let mut parameters = (*self.setup.shared.parameters()).clone();
         parameters.set_live(name, value).map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
-        self.arm.iter().for_each(|arm| arm.common.allow_motion(parameters.bool("allow_motion")));
+        let may_move = parameters.bool("allow_motion");
+        self.arm.iter().for_each(|arm| arm.common.may_move.store(may_move, Ordering::Release));
         self.setup.shared.set_parameters(parameters);
         self.setup.shared.offer(&self.view, ViewInput::Parameters);
         Ok(())
@@ -252,59 +265,12 @@ impl RefinementWorker {
 const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
 
 /// The files of one call of `~/save_mesh`.
-struct SavedFiles {
-    mesh: PathBuf,
-    features: Option<PathBuf>,
-    touches: Option<PathBuf>,
-}
-
-impl SavedFiles {
-    fn of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<Self, String> {
-        let name = if request.name.is_empty() { DEFAULT_NAME } else { &request.name };
-        let place = |name: &str| folder.place(name, request.overwrite).map_err(|why| why.to_string());
-        let mesh = place(name)?;
-        crate::io::mesh_file::check_target(&mesh).map_err(|why| why.to_string())?;
-        let stem = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let beside = |ending: &str| request.with_features.then(|| place(&format!("{stem}.{ending}"))).transpose();
-        Ok(Self { features: beside("features.json")?, touches: beside("touches.csv")?, mesh })
-    }
-
-    /// What `touchup refine` would write of the samples so far.
-    fn write(
-        &self,
-        setup: &Setup,
-        snapshot: &Receiver<Snapshot>,
-        patcher: Option<Receiver<Patcher>>,
-    ) -> Result<[usize; 2], String> {
-        let late = |_| "mesh and touches were not complete in time: save again".to_owned();
-        let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT)).transpose().map_err(late)?;
-        let refined = match patcher {
-            // all of it comes from scan and patch
-            Some(_) => None,
-            None => Some(
-                setup.clock.recv_timeout(snapshot, COPY_WAIT).map_err(late)?.mesh().map_err(|why| why.to_string())?,
-            ),
-        };
-        let [features, touches] = [&self.features, &self.touches].map(|place| place.as_deref());
-        let places = OutcomePlaces {
-            mesh: &self.mesh,
-            unit: setup.mesh_unit,
-            features,
-            touches,
-            outside: setup.cut.outside.as_ref(),
-        };
-        let refined = refined.as_ref().unwrap_or(&setup.scan.0);
-        places.write(&setup.scan.0, refined, patcher).map(|outcome| outcome.counts).map_err(|why| why.to_string())
-    }
-
-    fn answer(&self, mesh_version: u64, [vertices, faces]: [usize; 2]) -> SaveMeshResponse {
-        SaveMeshResponse {
-            success: true,
-            message: format!("wrote {}", self.mesh.display()),
-            path: self.mesh.display().to_string(),
-            mesh_version,
-            vertex_count: vertices as u32,
-            face_count: faces as u32,
-        }
-    }
+fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultFiles, String> {
+    let name = if request.name.is_empty() { DEFAULT_NAME } else { &request.name };
+    let place = |name: &str| folder.place(name, request.overwrite).map_err(|why| why.to_string());
+    let mesh = place(name)?;
+    crate::io::mesh_file::check_target(&mesh).map_err(|why| why.to_string())?;
+    let stem = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let beside = |ending: &str| request.with_features.then(|| place(&format!("{stem}.{ending}"))).transpose();
+    Ok(ResultFiles { features: beside("features.json")?, touches: beside("touches.csv")?, mesh })
 }

@@ -56,8 +56,8 @@ pub enum FeatureInput {
     Probed(TouchDelta),
     /// a new session
     Session(String),
-    /// somebody points at a place, m, in O
-    Flag(FlaggedPlace, Option<Reply<FlagFeatureResponse>>),
+    /// somebody points at a place, which has no number yet
+    Flag(Flag, Option<Reply<FlagFeatureResponse>>),
     /// takes that back
     Unflag(u32, Reply<UnflagFeatureResponse>),
     /// asks what is to be probed; no numbers: all that is flagged
@@ -66,17 +66,6 @@ pub enum FeatureInput {
     Measured(Box<ArmMeasurement>),
     /// looks at the mesh now
     Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
-}
-
-/// A place that somebody pointed at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FlaggedPlace {
-    /// as in messages; 0: a region to be explored
-    pub kind: u8,
-    /// m, in O
-    pub point: Point3<f64>,
-    /// how far around it, m
-    pub radius: f64,
 }
 
 /// What an arm has measured.

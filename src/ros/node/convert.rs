@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 
 use crate::ros::clock::{self, time};
 use crate::ros::messages::{
-    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, Vector3 as Vector3Msg,
-    Wrench as WrenchMsg, WrenchStamped,
+    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, TriggerResponse,
+    Vector3 as Vector3Msg, Wrench as WrenchMsg, WrenchStamped,
 };
 use crate::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
 
@@ -28,10 +28,9 @@ pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
 
 /// A transform; `None` for one that is none.
 pub fn transform(transform: &Transform) -> Option<Isometry3<f64>> {
-    let (p, q) = (&transform.translation, &transform.rotation);
-    let rotation: UnitQuaternion<f64> = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;
-    let translation = Translation3::new(p.x, p.y, p.z);
-    translation.vector.iter().all(|x| x.is_finite()).then(|| Isometry3::from_parts(translation, rotation))
+    let Vector3Msg { x, y, z } = transform.translation;
+    let pose = isometry(&Pose { position: Point { x, y, z }, orientation: transform.rotation })?;
+    pose.translation.vector.iter().all(|x| x.is_finite()).then_some(pose)
 }
 
 /// As a message has it.
@@ -70,6 +69,11 @@ pub fn as_wrench(wrench: &StampedWrench, frame: &str) -> WrenchStamped {
     let Wrench { force, torque } = &wrench.wrench;
     let wrench_msg = WrenchMsg { force: vector(force), torque: vector(torque) };
     WrenchStamped { header: header(wrench.stamp_ns, frame), wrench: wrench_msg }
+}
+
+/// Whether it is done, and how or why not.
+pub fn trigger(done: Result<String, String>) -> TriggerResponse {
+    TriggerResponse { success: done.is_ok(), message: done.unwrap_or_else(|why| why) }
 }
 
 /// What has no meaning.

@@ -2,41 +2,46 @@
 
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::convert::{NO_VECTOR, header, point, point_of, pose, vector, vector_of};
+use super::convert::{NO_VECTOR, point, point_of, pose, vector, vector_of};
 use crate::features::{Feature, FittedTo, Kind, Measured};
+use crate::probing::execute::Flag;
 use crate::ros::messages::{
     ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Vector3 as Vector3Msg,
 };
+use crate::ros::parameters::KIND_NAMES;
 
 /// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
 const AT_95_PERCENT: f64 = 1.96;
 /// Height of the labels, m.
-pub const LETTERS: f64 = 3e-3;
+const LETTERS: f64 = 3e-3;
 /// Width of lines, m.
 const LINE: f64 = 0.6e-3;
 /// So far off the surface it does not show through in spots, m.
 const CLEAR: f64 = 0.1e-3;
 
-/// Number of a kind in messages.
-pub fn number_of(kind: Kind) -> u8 {
+/// Number of a kind in messages; `None` is a region of which nobody knows what it is.
+pub fn number_of(kind: Option<Kind>) -> u8 {
     match kind {
-        Kind::Hole => FeatureMsg::KIND_HOLE,
-        Kind::Slot => FeatureMsg::KIND_SLOT,
-        Kind::Pocket => FeatureMsg::KIND_POCKET,
-        Kind::Boss => FeatureMsg::KIND_BOSS,
-        Kind::Edge => FeatureMsg::KIND_EDGE,
-        Kind::Corner => FeatureMsg::KIND_CORNER,
-        Kind::Plane => FeatureMsg::KIND_PLANE,
+        None => FeatureMsg::KIND_UNKNOWN,
+        Some(Kind::Hole) => FeatureMsg::KIND_HOLE,
+        Some(Kind::Slot) => FeatureMsg::KIND_SLOT,
+        Some(Kind::Pocket) => FeatureMsg::KIND_POCKET,
+        Some(Kind::Boss) => FeatureMsg::KIND_BOSS,
+        Some(Kind::Edge) => FeatureMsg::KIND_EDGE,
+        Some(Kind::Corner) => FeatureMsg::KIND_CORNER,
+        Some(Kind::Plane) => FeatureMsg::KIND_PLANE,
     }
 }
 
-/// Kind of a number in messages; `None` for a region of which nobody knows what it is.
-pub fn kind_of(number: u8) -> Option<Kind> {
-    Kind::ALL.into_iter().find(|kind| number_of(*kind) == number)
+/// Kind of a number in messages.
+///
+/// # Errors
+/// In words, when no kind has this number.
+pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
+    let mut kinds = std::iter::once(None).chain(Kind::ALL.into_iter().map(Some));
+    let most = KIND_NAMES.len() - 1;
+    kinds.find(|kind| number_of(*kind) == number).ok_or_else(|| format!("there is no kind {number}: 0 to {most} are"))
 }
-
-/// Names of the kinds by their numbers.
-pub const KIND_NAMES: [&str; 8] = ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"];
 
 /// A feature that was found.
 ///
@@ -53,7 +58,7 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
     let sized = feature.diameter.as_ref().or(feature.width.as_ref()).map(|m| m.touches.len());
     FeatureMsg {
         id,
-        kind: number_of(feature.kind),
+        kind: number_of(Some(feature.kind)),
         status: FeatureMsg::STATUS_FOUND,
         fitted_to: match feature.fitted_to {
             FittedTo::Touches => FeatureMsg::FITTED_TO_TOUCHES,
@@ -85,17 +90,15 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
 }
 
 /// A place that somebody pointed at, where nothing was found yet.
-pub fn flagged(id: u32, kind: u8, centre: &Point3<f64>, search_radius: f64) -> FeatureMsg {
+pub fn flagged(flag: &Flag) -> FeatureMsg {
     let nan = f64::NAN;
     FeatureMsg {
-        id,
-        kind,
+        id: flag.id,
+        kind: number_of(flag.kind),
         status: FeatureMsg::STATUS_FLAGGED,
         fitted_to: FeatureMsg::FITTED_TO_NOTHING,
-        touched: 0.0,
-        touch_count: 0,
-        search_radius,
-        center: point(centre),
+        search_radius: flag.radius,
+        center: point(&flag.place),
         center_std: nan,
         axis: NO_VECTOR,
         axis_std: nan,
@@ -113,7 +116,7 @@ pub fn flagged(id: u32, kind: u8, centre: &Point3<f64>, search_radius: f64) -> F
         through: FeatureMsg::UNKNOWN,
         convex: FeatureMsg::UNKNOWN,
         group: FeatureMsg::NO_GROUP,
-        points: Vec::new(),
+        ..FeatureMsg::default()
     }
 }
 
@@ -153,18 +156,33 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
             // the center of a boss is at its foot, and the label would be inside
             let is_boss = feature.kind == FeatureMsg::KIND_BOSS && !feature.depth.is_nan();
             let place = point_of(&feature.center) + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
-            markers.push(Marker {
-                ns: "labels".to_owned(),
-                r#type: Marker::TEXT_VIEW_FACING,
-                pose: Pose { position: point(&place), ..Pose::default() },
-                scale: Vector3Msg { z: LETTERS, ..Vector3Msg::default() },
-                color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
-                text: label(feature),
-                ..base
-            });
+            let white = ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
+            markers.push(letters(&place, label(feature), white, Marker { ns: "labels".to_owned(), ..base }));
         }
     }
     MarkerArray { markers }
+}
+
+/// A ball to look at.
+pub fn ball(centre: Point, diameter: f64, base: Marker) -> Marker {
+    Marker {
+        r#type: Marker::SPHERE,
+        pose: Pose { position: centre, ..Pose::default() },
+        scale: Vector3Msg { x: diameter, y: diameter, z: diameter },
+        ..base
+    }
+}
+
+/// Words to look at.
+pub fn letters(place: &Point3<f64>, text: String, color: ColorRGBA, base: Marker) -> Marker {
+    Marker {
+        r#type: Marker::TEXT_VIEW_FACING,
+        pose: Pose { position: point(place), ..Pose::default() },
+        scale: Vector3Msg { z: LETTERS, ..Vector3Msg::default() },
+        color,
+        text,
+        ..base
+    }
 }
 
 /// A part has dozens of edges and planes: those speak for themselves.
@@ -188,12 +206,7 @@ fn colour(feature: &FeatureMsg) -> ColorRGBA {
 }
 
 fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
-    let sphere = |diameter: f64| Marker {
-        r#type: Marker::SPHERE,
-        pose: Pose { position: feature.center, ..Pose::default() },
-        scale: Vector3Msg { x: diameter, y: diameter, z: diameter },
-        ..base.clone()
-    };
+    let sphere = |diameter| ball(feature.center, diameter, base.clone());
     if feature.status == FeatureMsg::STATUS_FLAGGED {
         return Some(sphere(2.0 * feature.search_radius));
     }
@@ -242,31 +255,21 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     }
 }
 
-/// An array of nothing yet.
-pub fn no_features(stamp_ns: i64, frame: &str, session: &str) -> FeatureArray {
-    FeatureArray {
-        header: header(stamp_ns, frame),
-        session: session.to_owned(),
-        mesh_version: 1,
-        features: Vec::new(),
-        unexplained: f64::NAN,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn labels_read_as_on_a_drawing() {
-        let mut hole = flagged(3, FeatureMsg::KIND_HOLE, &Point3::origin(), 5e-3);
+        let place = |id, kind| flagged(&Flag { id, kind: Some(kind), place: Point3::origin(), radius: 5e-3 });
+        let mut hole = place(3, Kind::Hole);
         assert_eq!(label(&hole), "hole?");
         hole.status = FeatureMsg::STATUS_FOUND;
         (hole.diameter, hole.diameter_std) = (8.02e-3, 0.02e-3);
         assert_eq!(label(&hole), "hole Ø8.02 ± 0.04");
         hole.diameter_std = f64::NAN;
         assert_eq!(label(&hole), "hole Ø8.02");
-        let mut slot = flagged(4, FeatureMsg::KIND_SLOT, &Point3::origin(), 5e-3);
+        let mut slot = place(4, Kind::Slot);
         slot.status = FeatureMsg::STATUS_FOUND;
         (slot.width, slot.length, slot.length_std) = (6e-3, 20e-3, 0.1e-3);
         assert_eq!(label(&slot), "slot 6.00 × 20.00 ± 0.20");

@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 
-use super::channels::{ArmMeasurement, FeatureInput, FlaggedPlace, NextTouches, ViewInput};
+use super::channels::{ArmMeasurement, FeatureInput, NextTouches, ViewInput};
 use super::convert::header;
-use super::feature_messages::{self, KIND_NAMES, flagged, found};
+use super::feature_messages::{flagged, found};
 use super::shared::Shared;
 use crate::clock::Clock;
-use crate::features::{Feature, Tracker};
+use crate::features::{Feature, Kind, Tracker};
 use crate::mesh::{FaceTree, MeshError};
 use crate::probing::execute::Flag;
 use crate::probing::plan::{NextTouch, advise_next_touch};
@@ -20,6 +20,7 @@ use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
     UnflagFeatureResponse,
 };
+use crate::ros::parameters::KIND_NAMES;
 use crate::stylus::ProbedPoint;
 
 /// The mesh is looked at again when it has not changed for so long …
@@ -42,7 +43,7 @@ pub struct FeatureWorker {
     tracker: Tracker,
     touches: Vec<ProbedPoint>,
     /// by number; those at which nothing was found yet
-    flags: BTreeMap<u32, FlaggedPlace>,
+    flags: BTreeMap<u32, Flag>,
     /// how far around a feature that was found somebody wants it looked for, m, by its number
     radii: BTreeMap<u32, f64>,
     /// number under which a feature is known, where that is the number of its flag
@@ -119,13 +120,10 @@ impl FeatureWorker {
             }
             FeatureInput::Flag(flag, reply) => {
                 let answer = self.flag(flag);
-                if let Some(reply) = reply {
-                    reply.send(answer);
-                }
+                reply.into_iter().for_each(|reply| reply.send(answer.clone()));
             }
             FeatureInput::Unflag(id, reply) => {
-                let (success, message) = self.unflag(id);
-                reply.send(UnflagFeatureResponse { success, message });
+                reply.send(self.unflag(id));
             }
             FeatureInput::Targets(ids, reply) => {
                 // who asked may have gone
@@ -188,11 +186,10 @@ impl FeatureWorker {
 
     /// The nearest feature where somebody pointed, of the kind that is meant. A region to be explored stays one: a plane in it is
     /// no answer.
-    fn nearest(&self, flag: &FlaggedPlace, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
-        let far = |feature: &&Feature| (feature.centre.value - flag.point).norm();
-        let is_meant = |feature: &&Feature| {
-            flag.kind == feature_messages::number_of(feature.kind) && far(feature) <= flag.radius && may_be(feature)
-        };
+    fn nearest(&self, flag: &Flag, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
+        let far = |feature: &&Feature| (feature.centre.value - flag.place).norm();
+        let is_meant =
+            |feature: &&Feature| flag.kind == Some(feature.kind) && far(feature) <= flag.radius && may_be(feature);
         self.tracker.features().iter().filter(is_meant).min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
@@ -210,45 +207,38 @@ impl FeatureWorker {
         }
     }
 
-    fn flag(&mut self, flag: FlaggedPlace) -> FlagFeatureResponse {
-        let refused = |message| FlagFeatureResponse { success: false, message, id: 0 };
-        let Some(kind) = KIND_NAMES.get(usize::from(flag.kind)) else {
-            return refused(format!("there is no kind {}: 0 to {} are", flag.kind, KIND_NAMES.len() - 1));
-        };
+    fn flag(&mut self, flag: Flag) -> FlagFeatureResponse {
+        let kind = flag.kind.map_or("unknown", Kind::name);
         if self.flags.len() >= MOST_FLAGS {
-            return refused(format!("{MOST_FLAGS} places are flagged already: take some back"));
+            let message = format!("{MOST_FLAGS} places are flagged already: take some back");
+            return FlagFeatureResponse { success: false, message, id: 0 };
         }
         self.has_changes = true;
         if let Some(id) = self.nearest(&flag, |_| true).map(|feature| self.name_of(feature)) {
             self.radii.insert(id, flag.radius);
             return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
         }
-        let same = |other: &FlaggedPlace| other.kind == flag.kind && (other.point - flag.point).norm() <= flag.radius;
+        let same = |other: &Flag| other.kind == flag.kind && (other.place - flag.place).norm() <= flag.radius;
         let again = self.flags.iter().find(|(_, other)| same(other)).map(|(id, _)| *id);
         let id = again.unwrap_or_else(|| self.tracker.fresh_id());
-        self.flags.insert(id, flag);
+        self.flags.insert(id, Flag { id, ..flag });
         FlagFeatureResponse { success: true, message: format!("flagged a place for a {kind}: number {id}"), id }
     }
 
-    fn unflag(&mut self, id: u32) -> (bool, String) {
+    fn unflag(&mut self, id: u32) -> UnflagFeatureResponse {
         let (was_place, was_found) = (self.flags.remove(&id).is_some(), self.radii.remove(&id).is_some());
+        let message = match (was_place, was_found) {
+            (true, _) => format!("took flag {id} back"),
+            (_, true) => format!("took the flag of {id} back; the feature stays"),
+            _ => format!("nothing with the number {id} is flagged"),
+        };
         self.has_changes |= was_place || was_found;
-        match (was_place, was_found) {
-            (true, _) => (true, format!("took flag {id} back")),
-            (_, true) => (true, format!("took the flag of {id} back; the feature stays")),
-            _ => (false, format!("nothing with the number {id} is flagged")),
-        }
+        UnflagFeatureResponse { success: was_place || was_found, message }
     }
 
     /// What is flagged, or has one of these numbers.
     fn targets(&self, ids: &[u32]) -> Vec<Flag> {
         let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
-        let places = self.flags.iter().map(|(&id, flag)| Flag {
-            id,
-            kind: feature_messages::kind_of(flag.kind),
-            place: flag.point,
-            radius: flag.radius,
-        });
         let found = self.tracker.features().iter().map(|feature| {
             let id = self.name_of(feature);
             let (kind, place, radius) = (Some(feature.kind), feature.centre.value, self.radii.get(&id).copied());
@@ -258,7 +248,7 @@ impl FeatureWorker {
             true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),
             false => ids.contains(&target.id),
         };
-        let all = places.map(|target| (true, target)).chain(found);
+        let all = self.flags.values().map(|flag| (true, *flag)).chain(found);
         let mut targets: Vec<_> = all.filter(|(flagged, target)| is_wanted(target, *flagged)).map(|(_, t)| t).collect();
         targets.sort_by_key(|target| ids.iter().position(|id| *id == target.id));
         targets
@@ -293,14 +283,14 @@ impl FeatureWorker {
             let id = self.name_of(feature);
             found(feature, id, self.radii.get(&id).copied())
         });
-        let places = self.flags.iter().map(|(&id, flag)| flagged(id, flag.kind, &flag.point, flag.radius));
         let measured = |id: u32| {
             let feature = &self.measured.get(&id)?.feature;
             let radius = self.radii.get(&id).copied().or_else(|| self.flags.get(&id).map(|flag| flag.radius));
             Some(FeatureMsg { status: FeatureMsg::STATUS_PROBED, ..found(feature, id, radius) })
         };
         // what an arm has measured is better than what the mesh shows
-        let mut features: Vec<_> = known.chain(places).map(|one| measured(one.id).unwrap_or(one)).collect();
+        let mut features: Vec<_> =
+            known.chain(self.flags.values().map(flagged)).map(|one| measured(one.id).unwrap_or(one)).collect();
         // also one that is flagged no longer
         let is_listed = |id: &&u32| features.iter().any(|one| one.id == **id);
         let others: Vec<_> = self.measured.keys().filter(|id| !is_listed(id)).filter_map(|&id| measured(id)).collect();
@@ -327,7 +317,7 @@ impl FeatureWorker {
             Some((self.name_of(feature), next))
         });
         let flagged =
-            self.flags.iter().map(|(&id, flag)| (id, NextTouch { place: flag.point, normal: Vector3::zeros() }));
+            self.flags.values().map(|flag| (flag.id, NextTouch { place: flag.place, normal: Vector3::zeros() }));
         // what an arm has measured well enough needs no hand
         let is_open = |id: &u32| !self.measured.get(id).is_some_and(|measured| measured.is_done);
         flagged.chain(found).filter(|(id, _)| is_open(id)).collect()

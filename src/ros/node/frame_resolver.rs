@@ -48,11 +48,6 @@ impl Refusal {
             Self::AxesChanged => "axes_changed",
         }
     }
-
-    /// Whether a transform that is still to come may help.
-    pub fn may_pass(&self) -> bool {
-        matches!(self, Self::Frame(FrameError::NotYet(..)))
-    }
 }
 
 /// Names of the frames that the rule knows.
@@ -141,26 +136,20 @@ impl FrameResolver {
         if name.is_empty() {
             return Err(Refusal::NoFrame);
         }
-        let Some(pose_wo) = self.placement.pose_wo else {
-            return match self.frames.pose(object, name, stamp_ns) {
-                _ if name == object => Ok(None),
-                // without `scan_to_space` the scan lies in the cell as it is
-                Err(FrameError::Unknown(_) | FrameError::NotConnected(..)) if name == CELL => Ok(None),
-                pose => Ok(Some(pose?)),
-            };
-        };
-        if name == CELL {
-            Ok(None)
-        } else if name == object {
-            Ok(Some(pose_wo))
-        } else {
-            match self.frames.pose(CELL, name, stamp_ns) {
-                Err(FrameError::Unknown(_) | FrameError::NotConnected(..)) => {
-                    Ok(Some(pose_wo * self.frames.pose(object, name, stamp_ns)?))
-                }
-                pose => Ok(Some(pose?)),
+        let in_object = || self.frames.pose(object, name, stamp_ns);
+        let is_apart = |pose: &Result<_, _>| matches!(pose, Err(FrameError::Unknown(_) | FrameError::NotConnected(..)));
+        Ok(match self.placement.pose_wo {
+            None if name == object => None,
+            // without `scan_to_space` the scan lies in the cell as it is
+            None if name == CELL && is_apart(&in_object()) => None,
+            None => Some(in_object()?),
+            Some(_) if name == CELL => None,
+            Some(pose_wo) if name == object => Some(pose_wo),
+            Some(pose_wo) => {
+                let in_cell = self.frames.pose(CELL, name, stamp_ns);
+                Some(if is_apart(&in_cell) { pose_wo * in_object()? } else { in_cell? })
             }
-        }
+        })
     }
 
     /// Pose of any frame in that of the object.

@@ -130,7 +130,7 @@ impl DraftPatch {
             (from, to) = (from.saturating_sub(list.len()), to.saturating_sub(list.len()));
             ours
         };
-        let [vertex_count, face_count] = replica.counts();
+        let [vertex_count, face_count] = replica.counts;
         let mut message = MeshPatch {
             header: header(replica.stamp_ns, frame),
             session: replica.session.clone(),

@@ -13,7 +13,8 @@ use tracing::warn;
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
 use super::error::NodeError;
-use super::frame_resolver::{FrameResolver, Refusal};
+use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
+use super::frames::FrameError;
 use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
@@ -96,10 +97,12 @@ impl RefinementWorker {
         arm: Option<ArmHandle>,
     ) -> Self {
         let now = setup.clock.now();
+        let (object, tool, sensor) =
+            (setup.shared.frame.clone(), setup.tool.clone(), format!("{}_sensor", setup.source));
         Self {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
-            resolver: FrameResolver::new(setup.frame_names(), setup.scene.placement()),
+            resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
             port,
             view,
@@ -225,17 +228,15 @@ impl RefinementWorker {
         };
         match placed {
             Ok(placed) => self.pair(placed, message.stream(), at),
-            Err(refusal) if refusal.may_pass() => return Some(message),
-            Err(refusal) => self.refuse(&refusal),
+            Err(Refusal::Frame(FrameError::NotYet(..))) => return Some(message),
+            Err(refusal) => {
+                self.session.counters.refuse(refusal.name());
+                if let Refusal::Frame(error) = &refusal {
+                    self.lost_transform = Some((self.setup.clock.now(), error.to_string()));
+                }
+            }
         }
         None
-    }
-
-    fn refuse(&mut self, refusal: &Refusal) {
-        self.session.counters.refuse(refusal.name());
-        if let Refusal::Frame(error) = refusal {
-            self.lost_transform = Some((self.setup.clock.now(), error.to_string()));
-        }
     }
 
     /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
@@ -289,14 +290,6 @@ impl RefinementWorker {
         }
     }
 
-    /// While no sample comes the mesh goes on to what the patch knows by then: what is shown is not left behind.
-    fn rest(&mut self) {
-        match self.session.engine.rest() {
-            Ok(()) => self.note_changes(),
-            Err(error) => self.fail(&error),
-        }
-    }
-
     fn fail(&mut self, error: &LiveError) {
         warn!(%error, "no samples are taken any more");
         self.fault = Some(error.to_string());
@@ -318,7 +311,11 @@ impl RefinementWorker {
         if now.saturating_duration_since(self.edits_sent) >= EDITS_EVERY {
             self.edits_sent = now;
             if self.fault.is_none() && now.saturating_duration_since(self.sampled) >= RESTS_AFTER {
-                self.rest();
+                // the mesh goes on to what the patch knows by then: what is shown is not left behind
+                match self.session.engine.rest() {
+                    Ok(()) => self.note_changes(),
+                    Err(error) => self.fail(&error),
+                }
             }
             self.send_edits();
             self.send_probed();

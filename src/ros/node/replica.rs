@@ -99,8 +99,8 @@ pub struct MeshVersion {
     positions: Vec<Point3<f64>>,
     support: Vec<Option<Support>>,
     corners: Vec<[u32; 3]>,
-    vertex_count: u32,
-    face_count: u32,
+    /// of the vertices and of the faces that there are
+    pub counts: [u32; 2],
 }
 
 impl MeshVersion {
@@ -117,8 +117,7 @@ impl MeshVersion {
             positions: scan.positions().to_vec(),
             support: (0..slots).map(is_there).collect(),
             corners,
-            vertex_count: scan.vertex_count() as u32,
-            face_count: scan.face_count() as u32,
+            counts: [scan.vertex_count() as u32, scan.face_count() as u32],
         }
     }
 
@@ -135,7 +134,7 @@ impl MeshVersion {
             if let Some((position, _)) = place {
                 self.positions[at] = position;
             }
-            self.vertex_count = self.vertex_count + u32::from(place.is_some()) - u32::from(was_there);
+            self.counts[0] = self.counts[0] + u32::from(place.is_some()) - u32::from(was_there);
         }
         for &(face, corners) in &edits.faces {
             let at = face as usize;
@@ -144,16 +143,11 @@ impl MeshVersion {
             }
             let was_there = self.corners[at] != NO_FACE;
             self.corners[at] = corners.unwrap_or(NO_FACE);
-            self.face_count = self.face_count + u32::from(corners.is_some()) - u32::from(was_there);
+            self.counts[1] = self.counts[1] + u32::from(corners.is_some()) - u32::from(was_there);
         }
         if edits.is_complete {
             (self.version, self.stamp_ns) = (edits.version, edits.stamp_ns);
         }
-    }
-
-    /// How many vertices and faces there are.
-    pub fn counts(&self) -> [u32; 2] {
-        [self.vertex_count, self.face_count]
     }
 
     /// One more than the largest numbers of a vertex and of a face.
@@ -347,13 +341,13 @@ mod tests {
         }
         let faces: Vec<_> = scan.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
         assert!((0..1998).all(|face| replica.face(face) == Some(faces[face as usize])));
-        assert_eq!((replica.counts(), replica.slots()), ([2000, 1998], [2000, 1998]));
+        assert_eq!((replica.counts, replica.slots()), ([2000, 1998], [2000, 1998]));
         // the first vertex goes with its face, and one comes far beyond the last
         let new = (Point3::new(7.0, 8.0, 9.0), Support::Scan);
         replica.apply(&edits(&[(0, None), (2500, Some(new))], &[(0, None), (2100, Some([1, 2, 2500]))]));
         assert_eq!((replica.vertex(0), replica.vertex(2400), replica.vertex(2500)), (None, None, Some(new)));
         assert_eq!((replica.face(0), replica.face(2050), replica.face(2100)), (None, None, Some([1, 2, 2500])));
-        assert_eq!((replica.counts(), replica.slots()), ([2000, 1998], [2501, 2101]));
+        assert_eq!((replica.counts, replica.slots()), ([2000, 1998], [2501, 2101]));
     }
 
     fn version(version: u64, is_complete: bool) -> Edits {

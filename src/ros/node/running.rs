@@ -32,9 +32,7 @@ pub const INBOX: usize = 4096;
 #[derive(Debug)]
 pub struct Node {
     haptic: JoinHandle<Result<NodeEnd, NodeError>>,
-    view: JoinHandle<()>,
-    features: JoinHandle<()>,
-    arm: Option<JoinHandle<()>>,
+    others: Vec<JoinHandle<()>>,
     folder: PathBuf,
 }
 
@@ -123,7 +121,7 @@ impl Prepared {
         let view = begin(&clock, "view", move || view.run(&view_inputs))?;
         let features = begin(&clock, "features", move || features.run(&feature_inputs))?;
         let haptic = begin(&clock, "haptic", move || haptic.run(&inbox))?;
-        Ok(Node { haptic, view, features, arm, folder })
+        Ok(Node { haptic, others: arm.into_iter().chain([features, view]).collect(), folder })
     }
 }
 
@@ -138,11 +136,8 @@ impl Node {
     /// # Errors
     /// [`NodeError`] when the result was not written, or a thread ended by a fault.
     pub fn join(self) -> Result<NodeEnd, NodeError> {
-        let Self { haptic, view, features, arm, .. } = self;
-        let ended = haptic.join().map_err(|_| NodeError::Stopped)?;
-        for thread in arm.into_iter().chain([features, view]) {
-            thread.join().map_err(|_| NodeError::Stopped)?;
-        }
+        let ended = self.haptic.join().map_err(|_| NodeError::Stopped)?;
+        self.others.into_iter().try_for_each(JoinHandle::join).map_err(|_| NodeError::Stopped)?;
         ended
     }
 }

@@ -17,7 +17,7 @@ use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta}
 use crate::mesh::TriMesh;
 use crate::reconstruct::Patcher;
 use crate::ros::port::Port;
-use crate::session::{Outcome, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
+use crate::session::{Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
 use crate::stylus::{Synchroniser, WrenchFrame};
 
 /// What was refused and lost, and how long things took.
@@ -26,18 +26,15 @@ pub struct Counters {
     /// samples that the refiner took
     pub accepted: u64,
     /// messages and samples that were not taken, by reason
-    pub refused: BTreeMap<String, u64>,
+    pub refused: BTreeMap<&'static str, u64>,
     /// messages that came while the node was paused
     pub paused: u64,
 }
 
 impl Counters {
     /// One more of `count`.
-    pub fn refuse(&mut self, reason: &str) {
-        match self.refused.get_mut(reason) {
-            Some(count) => *count += 1,
-            None => drop(self.refused.insert(reason.to_owned(), 1)),
-        }
+    pub fn refuse(&mut self, reason: &'static str) {
+        *self.refused.entry(reason).or_default() += 1;
     }
 }
 
@@ -176,7 +173,10 @@ impl NodeSession {
         report.unrecorded = messages;
         let (refiner, patcher) = engine.finish()?;
         let patcher = patcher.filter(|_| refiner.counts().contacts > 0);
-        let outcome = write_result(setup, &folder, refiner.mesh(), patcher).inspect_err(|_| {
+        let [mesh, features, touches] =
+            ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
+        let files = ResultFiles { mesh, features: Some(features), touches: Some(touches) };
+        let outcome = files.write(setup, refiner.mesh(), patcher).inspect_err(|_| {
             if let Some(reason) = &reason {
                 tracing::error!("{messages} messages are not in the session's recording: {reason}");
             }
@@ -191,7 +191,8 @@ impl NodeSession {
 
     /// Everything that was not taken, by reason; those of poses begin with `pose_`.
     fn refused(&self) -> BTreeMap<String, u64> {
-        let mut refused = self.counters.refused.clone();
+        let mut refused: BTreeMap<_, _> =
+            self.counters.refused.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect();
         for (counts, prefix) in [(self.sync.counts(), ""), (self.sync.pose_counts(), "pose_")] {
             for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
                 *refused.entry(format!("{prefix}{reason}")).or_default() += count;
@@ -248,17 +249,32 @@ fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     Ok(engine)
 }
 
-fn write_result(
-    setup: &Setup,
-    folder: &SessionFolder,
-    refined: &TriMesh,
-    patcher: Option<Patcher>,
-) -> Result<Outcome, NodeError> {
-    let [mesh, features, touches] =
-        ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
-    let (features, touches, outside) = (Some(features.as_path()), Some(touches.as_path()), setup.cut.outside.as_ref());
-    let places = OutcomePlaces { mesh: &mesh, unit: setup.mesh_unit, features, touches, outside };
-    Ok(places.write(&setup.scan.0, refined, patcher).map_err(Box::new)?)
+/// The files of a result.
+pub struct ResultFiles {
+    /// as [`OutcomePlaces`] has them
+    pub mesh: PathBuf,
+    /// …
+    pub features: Option<PathBuf>,
+    /// …
+    pub touches: Option<PathBuf>,
+}
+
+impl ResultFiles {
+    /// Writes them, as `touchup refine` does.
+    ///
+    /// # Errors
+    /// [`OutcomeError`]
+    pub fn write(
+        &self,
+        setup: &Setup,
+        refined: &TriMesh,
+        patcher: Option<Patcher>,
+    ) -> Result<Outcome, Box<OutcomeError>> {
+        let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
+        let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
+        let places = OutcomePlaces { mesh: &self.mesh, unit, features, touches, outside };
+        Ok(places.write(&setup.scan.0, refined, patcher)?)
+    }
 }
 
 /// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.

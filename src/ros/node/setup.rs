@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::NodeError;
-use super::frame_resolver::FrameNames;
 use super::replica::MeshReplica;
 use super::shared::Shared;
 use crate::clock::Clock;
@@ -74,21 +73,9 @@ impl Setup {
             tool,
         })
     }
-
-    pub fn frame_names(&self) -> FrameNames {
-        FrameNames {
-            object: self.shared.frame.clone(),
-            tool: self.tool.clone(),
-            sensor: format!("{}_sensor", self.source),
-        }
-    }
 }
 
 /// The unit of the files, of the parameter `mesh_unit`.
 pub fn mesh_unit(parameters: &Parameters) -> MeshUnit {
-    match parameters.string("mesh_unit") {
-        "m" => MeshUnit::Metre,
-        "inch" => MeshUnit::Inch,
-        _ => MeshUnit::Millimetre,
-    }
+    MeshUnit::ALL.into_iter().find(|unit| unit.name() == parameters.string("mesh_unit")).unwrap_or_default()
 }

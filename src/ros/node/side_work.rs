@@ -4,6 +4,7 @@ use std::io;
 use std::thread::{Builder, JoinHandle};
 
 use crate::clock::Clock;
+use crate::ros::exchange::join;
 
 /// Starts a thread that waits on `clock`.
 ///
@@ -53,10 +54,7 @@ impl SideWork {
 
     /// Waits for all of it.
     pub fn finish(self) {
-        for thread in self.threads {
-            // one that ended by a fault has said so
-            let _ = thread.join();
-        }
+        join(self.threads);
     }
 }
 

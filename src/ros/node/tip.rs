@@ -1,10 +1,12 @@
 //! What an operator wants to know at the tip.
 
+use nalgebra::Point3;
+
 use super::channels::{LastTip, NextTouches};
 use super::convert::{header, point, point_of};
-use super::feature_messages::{LETTERS, label};
+use super::feature_messages::{ball, label, letters};
 use crate::probing::plan::NextTouch;
-use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Pose, Vector3};
+use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Vector3};
 
 /// Farther from a feature than this nobody asks for it, m.
 const NEAR: f64 = 0.05;
@@ -16,52 +18,33 @@ const TEXT_HEIGHT: f64 = 12e-3;
 pub fn markers(tip: &LastTip, features: &FeatureArray, next: &NextTouches, frame: &str) -> MarkerArray {
     let nearest = nearest(tip, features);
     let base = Marker { header: header(tip.stamp_ns, frame), ns: "tip".to_owned(), ..Marker::default() };
-    let diameter = 2.0 * tip.radius.max(0.5e-3);
-    let ball = Marker {
-        id: 0,
-        r#type: Marker::SPHERE,
-        pose: Pose { position: point(&tip.centre), ..Pose::default() },
-        scale: Vector3 { x: diameter, y: diameter, z: diameter },
-        color: ColorRGBA { r: 0.9, g: 0.3, b: 0.2, a: 0.9 },
-        ..base.clone()
-    };
-    let mut place = point(&tip.centre);
+    let red = ColorRGBA { r: 0.9, g: 0.3, b: 0.2, a: 0.9 };
+    let ball = ball(point(&tip.centre), 2.0 * tip.radius.max(0.5e-3), Marker { color: red, ..base.clone() });
+    let mut place = tip.centre;
     place.z += TEXT_HEIGHT;
-    let text = Marker {
-        id: 1,
-        r#type: Marker::TEXT_VIEW_FACING,
-        pose: Pose { position: place, ..Pose::default() },
-        scale: Vector3 { z: LETTERS, ..Vector3::default() },
-        color: ColorRGBA { r: 1.0, g: 0.95, b: 0.4, a: 1.0 },
-        text: text(tip, nearest, nearest.is_some_and(|feature| next.contains_key(&feature.id))),
-        ..base.clone()
+    let words = text(tip, nearest, nearest.is_some_and(|feature| next.contains_key(&feature.id)));
+    let yellow = ColorRGBA { r: 1.0, g: 0.95, b: 0.4, a: 1.0 };
+    let text = letters(&place, words, yellow, Marker { id: 1, ..base.clone() });
+    let arrow = |id, drawn: Option<([f64; 2], ColorRGBA, [Point3<f64>; 2])>| {
+        let arrow = Marker { id, r#type: Marker::ARROW, ..base.clone() };
+        match drawn {
+            Some(([x, y], color, ends)) => {
+                Marker { scale: Vector3 { x, y, z: 0.0 }, color, points: ends.iter().map(point).collect(), ..arrow }
+            }
+            None => Marker { action: Marker::DELETE, ..arrow },
+        }
     };
-    let arrow = Marker { id: 2, r#type: Marker::ARROW, ..base.clone() };
-    let arrow = match &tip.closest {
-        Some((closest, distance)) if *distance > tip.radius => Marker {
-            scale: Vector3 { x: 0.5e-3, y: 1.2e-3, z: 0.0 },
-            color: ColorRGBA { r: 0.9, g: 0.9, b: 0.2, a: 0.9 },
-            points: vec![point(&tip.centre), point(closest)],
-            ..arrow
-        },
-        // at the surface it would hide what it points at
-        _ => Marker { action: Marker::DELETE, ..arrow },
-    };
-    let there = Marker { id: 3, r#type: Marker::ARROW, ..base };
-    let there = match nearest.and_then(|feature| next.get(&feature.id)) {
-        // onto the place, from outside; where nobody knows what is outside, from the tip
-        Some(NextTouch { place, normal }) => Marker {
-            scale: Vector3 { x: 1.2e-3, y: 3e-3, z: 0.0 },
-            color: ColorRGBA { r: 0.2, g: 0.9, b: 0.4, a: 1.0 },
-            points: vec![
-                point(&if *normal == nalgebra::Vector3::zeros() { tip.centre } else { place + normal * NEXT_LENGTH }),
-                point(place),
-            ],
-            ..there
-        },
-        None => Marker { action: Marker::DELETE, ..there },
-    };
-    MarkerArray { markers: vec![ball, text, arrow, there] }
+    // at the surface it would hide what it points at
+    let closest = tip
+        .closest
+        .filter(|(_, distance)| *distance > tip.radius)
+        .map(|(closest, _)| ([0.5e-3, 1.2e-3], ColorRGBA { r: 0.9, g: 0.9, b: 0.2, a: 0.9 }, [tip.centre, closest]));
+    // onto the place, from outside; where nobody knows what is outside, from the tip
+    let there = nearest.and_then(|feature| next.get(&feature.id)).map(|NextTouch { place, normal }| {
+        let from = if *normal == nalgebra::Vector3::zeros() { tip.centre } else { place + normal * NEXT_LENGTH };
+        ([1.2e-3, 3e-3], ColorRGBA { r: 0.2, g: 0.9, b: 0.4, a: 1.0 }, [from, *place])
+    });
+    MarkerArray { markers: vec![ball, text, arrow(2, closest), arrow(3, there)] }
 }
 
 /// Length of the arrow onto the next place, m.

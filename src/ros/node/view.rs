@@ -44,7 +44,6 @@ impl View {
     /// Shows nothing yet.
     pub fn new(clock: Clock, port: Arc<dyn Port>, shared: Arc<Shared>, spare: SyncSender<Box<Edits>>) -> Self {
         let (replica, _) = shared.mesh.now();
-        let features = feature_messages::no_features(0, &shared.frame, &replica.session);
         Self {
             clock,
             tiles: Tiles::all_of(&replica),
@@ -53,7 +52,7 @@ impl View {
             whole: None,
             asked_whole: false,
             tip: None,
-            features: Arc::new(features),
+            features: Arc::default(),
             next: NextTouches::new(),
             port,
             shared,

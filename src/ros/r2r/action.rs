@@ -12,7 +12,7 @@ use super::touchup_msgs::action::Probe::Action;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
-use crate::ros::port::{Arrival, Call, Feedback, Goal, GoalEnd};
+use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd};
 use crate::ros::services::PROBE;
 
 /// A goal from the first question to the result.
@@ -52,7 +52,7 @@ pub(super) fn server(node: &mut Node, exchange: &Arc<Exchange>) -> Result<[PollS
     let exchange = exchange.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
         let wanted = ProbeGoal::ours(request.goal.clone());
-        exchange.arrivals.put(Arrival::Call(Call::Probe(wanted, goal(request, &exchange, &running))));
+        exchange.call(Call::Arm(ArmOrder::Goal(wanted, goal(request, &exchange, &running))));
     });
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }

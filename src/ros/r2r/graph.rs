@@ -71,25 +71,20 @@ impl R2rGraph {
             return true;
         }
         self.looked = Instant::now();
-        for watched in &mut self.watched {
-            match (watched.look)(node) {
-                Ok(seen) if seen != watched.reported => watched.report(seen, exchange),
+        for WatchedTopic { topic, is_mesh, look, reported } in &mut self.watched {
+            match look(node) {
+                Ok(seen) if seen != *reported => {
+                    if *is_mesh && seen.0 > reported.0 {
+                        exchange.arrivals.put(Arrival::Viewer);
+                    }
+                    exchange.arrivals.report(topic.clone(), seen.0, seen.1.clone());
+                    *reported = seen;
+                }
                 Ok(_) => {}
-                Err(error) => tracing::debug!(topic = watched.topic, %error, "nobody knows who is on a topic"),
+                Err(error) => tracing::debug!(topic, %error, "nobody knows who is on a topic"),
             }
         }
         self.context.is_valid()
-    }
-}
-
-impl WatchedTopic {
-    fn report(&mut self, seen: EndpointMatch, exchange: &Exchange) {
-        let topic = self.topic.clone();
-        if self.is_mesh && seen.0 > self.reported.0 {
-            exchange.arrivals.put(Arrival::Viewer);
-        }
-        self.reported = seen.clone();
-        exchange.arrivals.report(topic, seen.0, seen.1);
     }
 }
 

@@ -28,7 +28,7 @@ use super::clock::time;
 use super::exchange::{self, Exchange, Joined, RosError};
 use super::locked;
 use super::messages::{Parameter, ParameterEvent};
-use super::parameter_services::{self, raw};
+use super::parameter_services::{self, PublicParameters, raw};
 use super::parameters::ParameterValue;
 use super::port::{Arrival, Inbox, Port};
 use super::topics::{mesh, subscribe, urgent};
@@ -67,7 +67,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     subscribe(config, &mut back_end)?;
     let announce = announce(&mut back_end.node, config.place.full_name(), &exchange)?;
     super::services::serve(&mut back_end, &exchange)?;
-    parameter_services::serve(&mut back_end, &exchange, &config.parameters, Box::new(announce))?;
+    parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
     let R2rBackEnd { mut node, graph, mut sources, .. } = back_end;
     sources.extend(action::server(&mut node, &exchange)?);
     let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };

@@ -14,15 +14,9 @@ macro_rules! needs_ros {
 /// A message: its fields, and that r2r takes it for one.
 macro_rules! message {
     ($name:ident { $($field:ident: $kind:ty),* $(,)? }) => {
-        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         pub struct $name {
             $(pub $field: $kind,)*
-        }
-
-        impl Default for $name {
-            needs_ros! {
-                fn default() -> Self;
-            }
         }
 
         impl r2r::WrappedTypesupport for $name {

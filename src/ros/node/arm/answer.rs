@@ -3,15 +3,13 @@
 use nalgebra::Point3;
 
 use crate::probing::arm::{
-    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchOutcome, TouchRecord,
+    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchMoment, TouchOutcome, TouchRecord,
 };
-use crate::probing::execute::{Cell, Ending, Flag, Plan, ProbeParams, Probed, ProbedSlide, ProbedTouch};
+use crate::probing::execute::{Cell, Ending, Flag, Plan, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::clock::time;
-use crate::ros::messages::{
-    Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time, Vector3 as Vector3Msg, Wrench as WrenchMsg,
-};
-use crate::ros::node::convert::{NO_VECTOR, point, pose, vector, vector_of};
-use crate::ros::node::feature_messages::{flagged, found, number_of};
+use crate::ros::messages::{Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time};
+use crate::ros::node::convert::{NO_VECTOR, point, pose, vector};
+use crate::ros::node::feature_messages::{flagged, found};
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
@@ -25,12 +23,11 @@ pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
 
 /// Not begun.
 pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
-    let kind = target.kind.map_or(0, number_of);
     ProbeResult {
         id: target.id,
         code,
         message,
-        feature: flagged(target.id, kind, &target.place, target.radius),
+        feature: flagged(target),
         uncertainty: f64::NAN,
         ..ProbeResult::default()
     }
@@ -121,18 +118,20 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
 }
 
 /// What came of the touches of a feature, one message each.
+///
+/// - `radius`: of the tip, m.
 pub fn touches_of(
     target: &Flag,
     probed: &Probed,
-    params: &ProbeParams,
+    radius: f64,
     cell: &Cell,
     offset_ns: i64,
     frame: &str,
 ) -> Vec<ProbeTouch> {
-    let touches = probed.touches.iter().enumerate();
-    let made = touches.map(|(index, touch)| {
-        let (stamp, made) = touch_of(index, touch, params, cell, offset_ns);
-        ProbeTouch { header: Header { stamp, frame_id: frame.to_owned() }, id: target.id, ..downsampled(made) }
+    let made = probed.touches.iter().zip(0..).map(|(touch, index)| {
+        let (stamp, made) = touch_of(touch, radius, cell, offset_ns);
+        let header = Header { stamp, frame_id: frame.to_owned() };
+        ProbeTouch { header, id: target.id, index, ..downsampled(made) }
     });
     made.collect()
 }
@@ -188,17 +187,9 @@ fn stopped(error: &ProbeError) -> u8 {
 }
 
 /// The touch, and the stamp that goes into its header.
-fn touch_of(
-    index: usize,
-    touch: &ProbedTouch,
-    params: &ProbeParams,
-    cell: &Cell,
-    offset_ns: i64,
-) -> (Time, ProbeTouch) {
-    let radius = params.pattern.ball_radius;
+fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (Time, ProbeTouch) {
     let approach = touch.planned.direction.into_inner();
-    let base = ProbeTouch {
-        index: index as u32,
+    let mut made = ProbeTouch {
         verdict: ProbeTouch::HELD_BACK,
         accepted: touch.refused.is_none(),
         reason: touch.refused.clone().unwrap_or_default(),
@@ -210,26 +201,34 @@ fn touch_of(
         tip_radius: radius,
         ..ProbeTouch::default()
     };
-    let Some(record) = &touch.record else { return (Time::default(), base) };
-    let pose_ot = cell.pose_bo.inverse() * record.target.standoff_bt;
-    let with = curve_of(base, record);
-    let with = ProbeTouch { verdict: verdict_of(&record.outcome), ..with };
-    let (at, stamp_ns, touch) = match (&record.outcome, touch.centre) {
-        (TouchOutcome::Contact { onset, force_b, .. }, Some(centre)) => {
-            // the part pushes along its normal, but for friction
-            let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-approach);
-            let touch = ProbeTouch {
-                contact: point(&(centre - normal * radius)),
-                contact_std: onset.sigma,
-                normal: vector(&normal),
-                ..with
-            };
-            (centre, record.curve_ns + (onset_at(record, onset.travel) * 1e9) as i64, touch)
+    let Some(record) = &touch.record else { return (Time::default(), made) };
+    let (mut at, mut stamp_ns, mut onset_s) = (touch.planned.from, record.stamps_ns[1], 0.0);
+    match &record.outcome {
+        TouchOutcome::Contact { onset, force_b, .. } => {
+            onset_s = onset_at(record, onset.travel);
+            if let Some(centre) = touch.centre {
+                // the part pushes along its normal, but for friction
+                let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-approach);
+                made.contact = point(&(centre - normal * radius));
+                made.contact_std = onset.sigma;
+                made.normal = vector(&normal);
+                (at, stamp_ns) = (centre, record.curve_ns + (onset_s * 1e9) as i64);
+            }
         }
-        (TouchOutcome::Miss { travel }, _) => (touch.planned.from + approach * *travel, record.stamps_ns[1], with),
-        _ => (touch.planned.from, record.stamps_ns[1], with),
-    };
-    (time(stamp_ns + offset_ns), ProbeTouch { pose: pose(&at, &pose_ot.rotation), ..touch })
+        TouchOutcome::Miss { travel } => at += approach * *travel,
+        TouchOutcome::Unclear(_) => {}
+    }
+    made.verdict = verdict_of(&record.outcome);
+    made.pose = pose(&at, &(cell.pose_bo.inverse() * record.target.standoff_bt).rotation);
+    made.speed = record.speed;
+    // its size is known, and that the part pushes back
+    made.peak_wrench.force = vector(&(approach * -record.peak_force));
+    let row = |value: fn(&TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
+    made.curve_time = record.curve.iter().map(|m| (m.t - onset_s) as f32).collect();
+    made.curve_travel = row(|m| m.travel);
+    made.curve_force = row(|m| m.force);
+    made.curve_lateral_force = row(|m| m.lateral);
+    (time(stamp_ns + offset_ns), made)
 }
 
 fn verdict_of(outcome: &TouchOutcome) -> u8 {
@@ -249,24 +248,6 @@ fn verdict_of(outcome: &TouchOutcome) -> u8 {
 /// When a travel is reached first, s from the beginning of the curve.
 fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
     record.curve.iter().find(|m| m.travel >= travel).map_or(0.0, |m| m.t)
-}
-
-fn curve_of(touch: ProbeTouch, record: &TouchRecord) -> ProbeTouch {
-    let onset =
-        if let TouchOutcome::Contact { onset, .. } = &record.outcome { onset_at(record, onset.travel) } else { 0.0 };
-    let row =
-        |value: fn(&crate::probing::arm::TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
-    // its size is known, and that the part pushes back
-    let most = vector_of(&touch.approach) * -record.peak_force;
-    ProbeTouch {
-        speed: record.speed,
-        peak_wrench: WrenchMsg { force: vector(&most), torque: Vector3Msg::default() },
-        curve_time: record.curve.iter().map(|m| (m.t - onset) as f32).collect(),
-        curve_travel: row(|m| m.travel),
-        curve_force: row(|m| m.force),
-        curve_lateral_force: row(|m| m.lateral),
-        ..touch
-    }
 }
 
 #[cfg(test)]

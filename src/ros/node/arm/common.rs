@@ -12,9 +12,12 @@ use crate::ros::messages::{ProbeResult, TriggerResponse};
 #[derive(Debug, Default)]
 pub struct Common {
     is_busy: AtomicBool,
-    is_ending: AtomicBool,
-    is_paused: AtomicBool,
-    has_motion: AtomicBool,
+    /// the node ends: the arm stops, retracts, and takes nothing up any more
+    pub is_ending: AtomicBool,
+    /// `~/pause`: what moves stops and retracts
+    pub is_paused: AtomicBool,
+    /// the parameter `allow_motion`: where it is taken away, what moves stops and retracts
+    pub may_move: AtomicBool,
     seen: Mutex<StateSeen>,
 }
 
@@ -37,37 +40,18 @@ impl Common {
         self.is_busy.store(false, Ordering::Release);
     }
 
-    /// The node ends: the arm stops, retracts, and takes nothing up any more.
-    pub fn end(&self) {
-        self.is_ending.store(true, Ordering::Release);
-    }
-
-    /// Whether it does.
-    pub fn is_ending(&self) -> bool {
-        self.is_ending.load(Ordering::Acquire)
-    }
-
-    /// `~/pause`: what moves stops and retracts.
-    pub fn pause(&self, is_paused: bool) {
-        self.is_paused.store(is_paused, Ordering::Release);
-    }
-
-    /// The parameter `allow_motion`: where it is taken away, what moves stops and retracts.
-    pub fn allow_motion(&self, is_allowed: bool) {
-        self.has_motion.store(is_allowed, Ordering::Release);
-    }
-
     /// Why the arm may not move now: a code of [`ProbeResult`], and in words.
     pub fn why_not(&self) -> Option<(u8, &'static str)> {
-        if self.is_ending() {
-            Some((ProbeResult::SHUTDOWN, "the node ends"))
-        } else if self.is_paused.load(Ordering::Acquire) {
-            Some((ProbeResult::PAUSED, "the node is paused"))
-        } else if !self.has_motion.load(Ordering::Acquire) {
-            Some((ProbeResult::MOTION_NOT_ALLOWED, "the parameter allow_motion is off"))
-        } else {
-            None
-        }
+        let reasons = [
+            (self.is_ending.load(Ordering::Acquire), ProbeResult::SHUTDOWN, "the node ends"),
+            (self.is_paused.load(Ordering::Acquire), ProbeResult::PAUSED, "the node is paused"),
+            (
+                !self.may_move.load(Ordering::Acquire),
+                ProbeResult::MOTION_NOT_ALLOWED,
+                "the parameter allow_motion is off",
+            ),
+        ];
+        reasons.into_iter().find(|(is_so, ..)| *is_so).map(|(_, code, why)| (code, why))
     }
 
     /// A state came. A stop in it is one until somebody has looked, also when nobody moved the arm.

@@ -19,15 +19,15 @@ use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, plan};
 use crate::ros::messages::{
-    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureRequest, ProbeFeatureResponse, ProbeGoal, ProbeResponse,
-    ProbeResult, ProbeSettings, TriggerResponse,
+    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
+    ProbeSettings, TriggerResponse,
 };
 use crate::ros::node::channels::{ArmMeasurement, FeatureInput};
-use crate::ros::node::convert::{header, point};
+use crate::ros::node::convert::{header, point, trigger};
 use crate::ros::node::error::NodeError;
 use crate::ros::node::setup::Setup;
 use crate::ros::node::side_work::begin;
-use crate::ros::port::{Goal, GoalEnd, Port, Publication, Reply, SamplePort};
+use crate::ros::port::{ArmOrder, Goal, GoalEnd, Port, Publication, SamplePort};
 use crate::scene::simulated_arm;
 use crate::sim::{MeshSurface, SimArm};
 
@@ -42,46 +42,27 @@ const FOLLOW: i64 = 1024;
 /// Farther off it is another clock, ns.
 const OTHER_CLOCK_NS: i64 = 200_000_000;
 
-/// What the thread is asked.
-pub enum ArmInput {
-    /// `~/probe_feature`
-    Feature(ProbeFeatureRequest, Reply<ProbeFeatureResponse>),
-    /// `~/probe`
-    Goal(ProbeGoal, Goal),
-    /// `~/probe_all`
-    All(Reply<TriggerResponse>),
-    /// `~/recover`
-    Recover(Reply<TriggerResponse>),
-}
-
-impl ArmInput {
-    /// Answers that nothing was done, and why.
-    ///
-    /// - `code`: of [`ProbeResult`]
-    pub fn refuse(self, header: Header, code: u8, why: &str) {
-        match self {
-            Self::Feature(request, reply) => {
-                let result = ProbeResult { header, ..not_probed(request.id, code, why) };
-                reply.send(ProbeFeatureResponse { result });
-            }
-            Self::Goal(goal, Goal { accept, result, .. }) => {
-                accept.send(true);
-                let first = goal.ids.first().copied();
-                let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
-                result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
-            }
-            Self::All(reply) | Self::Recover(reply) => {
-                reply.send(TriggerResponse { success: false, message: why.to_owned() });
-            }
+/// Answers that nothing was done, and why.
+///
+/// - `code`: of [`ProbeResult`]
+pub fn refuse(order: ArmOrder, header: Header, code: u8, why: &str) {
+    match order {
+        ArmOrder::Feature(request, reply) => {
+            let result = ProbeResult { header, ..not_probed(request.id, code, why) };
+            reply.send(ProbeFeatureResponse { result });
         }
+        ArmOrder::Goal(goal, Goal { accept, result, .. }) => {
+            accept.send(true);
+            let first = goal.ids.first().copied();
+            let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
+            result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
+        }
+        ArmOrder::All(reply) | ArmOrder::Recover(reply) => reply.send(trigger(Err(why.to_owned()))),
     }
 }
 
-/// What the thread works at.
-struct ArmOrder {
-    input: ArmInput,
-    folder: PathBuf,
-}
+/// An order, and the folder of the session, where what is touched is written down.
+type FolderOrder = (ArmOrder, PathBuf);
 
 /// Which arm there is.
 pub enum ArmKind {
@@ -102,7 +83,7 @@ pub struct ArmOfNode {
 /// The arm's thread, as the others see it. Dropped, it has the arm stop, retract and end.
 #[derive(Debug)]
 pub struct ArmHandle {
-    inputs: SyncSender<ArmOrder>,
+    inputs: SyncSender<FolderOrder>,
     /// what it and the others know of each other
     pub common: Arc<Common>,
     cell: Cell,
@@ -110,7 +91,7 @@ pub struct ArmHandle {
 
 impl Drop for ArmHandle {
     fn drop(&mut self) {
-        self.common.end();
+        self.common.is_ending.store(true, Ordering::Release);
     }
 }
 
@@ -118,19 +99,18 @@ impl ArmHandle {
     /// Gives an order, or answers why it cannot be taken up.
     ///
     /// - `folder`: of the session, where what is touched is written down.
-    pub fn order(&self, input: ArmInput, folder: &Path, header: Header) {
+    pub fn order(&self, order: ArmOrder, folder: &Path, header: Header) {
         if !self.common.begin() {
-            return input.refuse(header, ProbeResult::BUSY, BUSY);
+            return refuse(order, header, ProbeResult::BUSY, BUSY);
         }
-        let order = ArmOrder { input, folder: folder.to_owned() };
-        let Err(error) = self.inputs.try_send(order) else { return };
+        let Err(error) = self.inputs.try_send((order, folder.to_owned())) else { return };
         self.common.done();
         match error {
-            TrySendError::Full(order) => order.input.refuse(header, ProbeResult::BUSY, BUSY),
+            TrySendError::Full((order, _)) => refuse(order, header, ProbeResult::BUSY, BUSY),
             // its thread has ended, and has said why
-            TrySendError::Disconnected(order) => {
+            TrySendError::Disconnected((order, _)) => {
                 let why = self.common.ready().err().unwrap_or_else(|| "the thread of the arm has ended".to_owned());
-                order.input.refuse(header, ProbeResult::ARM_NOT_READY, &why);
+                refuse(order, header, ProbeResult::ARM_NOT_READY, &why);
             }
         }
     }
@@ -148,7 +128,7 @@ struct ArmWorker {
     features: SyncSender<FeatureInput>,
     cell: Cell,
     params: ProbeParams,
-    inputs: Receiver<ArmOrder>,
+    inputs: Receiver<FolderOrder>,
     /// the time of ROS when the last state came, ns
     ros_ns: i64,
 }
@@ -166,7 +146,7 @@ pub fn start(
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
     let common = Arc::new(Common::default());
-    common.allow_motion(setup.shared.parameters().bool("allow_motion"));
+    common.may_move.store(setup.shared.parameters().bool("allow_motion"), Ordering::Release);
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
     let link = ArmLink { setup: Arc::clone(setup), samples, common, offset_ns: None, begun: setup.clock.now() };
@@ -174,7 +154,12 @@ pub fn start(
     let run = move || {
         match kind {
             ArmKind::Real(mut arm) => worker.run(&mut *arm),
-            ArmKind::Sim(part) => worker.run_simulated(&part),
+            ArmKind::Sim(part) => {
+                if let Err(why) = worker.run_simulated(&part) {
+                    warn!("{why}");
+                    worker.link.common.fail(&why);
+                }
+            }
         }
         worker.refuse_the_rest();
     };
@@ -183,28 +168,21 @@ pub fn start(
 }
 
 impl ArmWorker {
-    fn run_simulated(&mut self, part: &TriMesh) {
-        let surface = match MeshSurface::new(part) {
-            Ok(surface) => surface,
-            Err(error) => return self.fail(&format!("the simulated arm has no part to touch: {error}")),
-        };
-        match SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part)) {
-            Ok(arm) => self.run(&mut Paced::new(self.link.setup.clock.clone(), arm)),
-            Err(error) => self.fail(&format!("the simulated arm cannot begin: {error}")),
-        }
-    }
-
-    fn fail(&self, why: &str) {
-        warn!("{why}");
-        self.link.common.fail(why);
+    fn run_simulated(&mut self, part: &TriMesh) -> Result<(), String> {
+        let surface =
+            MeshSurface::new(part).map_err(|error| format!("the simulated arm has no part to touch: {error}"))?;
+        let arm = SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part));
+        let arm = arm.map_err(|error| format!("the simulated arm cannot begin: {error}"))?;
+        self.run(&mut Paced::new(self.link.setup.clock.clone(), arm));
+        Ok(())
     }
 
     /// Streams, and does what it is asked, until the node ends.
     fn run(&mut self, arm: &mut dyn Arm) {
-        while !self.link.common.is_ending() {
+        while !self.link.common.is_ending.load(Ordering::Acquire) {
             self.see_next(arm);
             match self.inputs.try_recv() {
-                Ok(order) => self.take(order, arm),
+                Ok((order, folder)) => self.take(order, &folder, arm),
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => return,
             }
@@ -213,8 +191,8 @@ impl ArmWorker {
 
     /// Nobody who still waits is left without an answer.
     fn refuse_the_rest(&self) {
-        for order in self.inputs.try_iter() {
-            order.input.refuse(self.header(), ProbeResult::SHUTDOWN, "the node ends");
+        for (order, _) in self.inputs.try_iter() {
+            refuse(order, self.header(), ProbeResult::SHUTDOWN, "the node ends");
         }
     }
 
@@ -248,40 +226,42 @@ impl ArmWorker {
         let deadline = self.link.setup.clock.now() + WAIT;
         loop {
             match ready.try_recv() {
-                Ok(made) => return Some(made),
-                Err(TryRecvError::Disconnected) => return None,
-                Err(TryRecvError::Empty) if self.link.setup.clock.now() > deadline || self.link.common.is_ending() => {
-                    return None;
+                Err(TryRecvError::Empty)
+                    if self.link.setup.clock.now() <= deadline
+                        && !self.link.common.is_ending.load(Ordering::Acquire) =>
+                {
+                    self.see_next(arm);
                 }
-                Err(TryRecvError::Empty) => self.see_next(arm),
+                made => return made.ok(),
             }
         }
     }
 
     /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
-    fn take(&mut self, ArmOrder { input, folder }: ArmOrder, arm: &mut dyn Arm) {
+    fn take(&mut self, order: ArmOrder, folder: &Path, arm: &mut dyn Arm) {
         self.link.begun = self.link.setup.clock.now();
-        match input {
-            ArmInput::Recover(reply) => {
-                let recovered = self.recover(arm);
+        match order {
+            ArmOrder::Recover(reply) => {
+                let recovered = arm.recover().inspect(|()| self.link.common.recovered());
+                let recovered = recovered.map(|()| "the arm may move again".to_owned());
                 self.link.common.done();
-                reply.send(recovered);
+                reply.send(trigger(recovered.map_err(|error| error.to_string())));
             }
-            ArmInput::All(reply) => {
-                let results = self.probe(&folder, &[], &ProbeSettings::default(), arm, None);
+            ArmOrder::All(reply) => {
+                let results = self.probe(folder, &[], &ProbeSettings::default(), arm, None);
                 self.link.common.done();
                 reply.send(TriggerResponse {
                     success: !results.is_empty() && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
                     message: summary_of(&results),
                 });
             }
-            ArmInput::Feature(request, reply) => {
-                let results = self.probe(&folder, &[request.id], &request.settings, arm, None);
+            ArmOrder::Feature(request, reply) => {
+                let results = self.probe(folder, &[request.id], &request.settings, arm, None);
                 let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NO_TARGETS));
                 self.link.common.done();
                 reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
             }
-            ArmInput::Goal(goal, handles) => self.goal(&folder, &goal, handles, arm),
+            ArmOrder::Goal(goal, handles) => self.goal(folder, &goal, handles, arm),
         }
     }
 
@@ -304,22 +284,12 @@ impl ArmWorker {
     /// A result as it is now, for who follows and for who asked.
     fn done(&self, result: ProbeResult) -> ProbeResult {
         let result = ProbeResult { header: self.header(), ..result };
-        self.port.publish(Publication::ProbeResult(Box::new(result.clone())));
+        self.port.publish(Publication::ProbeResult(result.clone()));
         result
     }
 
     fn header(&self) -> Header {
         header(self.port.now_ns(), &self.link.setup.shared.frame)
-    }
-
-    fn recover(&mut self, arm: &mut dyn Arm) -> TriggerResponse {
-        match arm.recover() {
-            Ok(()) => {
-                self.link.common.recovered();
-                TriggerResponse { success: true, message: "the arm may move again".to_owned() }
-            }
-            Err(error) => TriggerResponse { success: false, message: error.to_string() },
-        }
     }
 
     /// Probes what is asked for, one after the other; a result for each that was begun.
@@ -437,9 +407,8 @@ impl ArmWorker {
             self.link.common.stop(&probed.ending.to_string());
         }
         let ball_radius = wanted.params.pattern.ball_radius;
-        if let Err(error) =
-            append_probed_touches(&probed, ball_radius, self.link.offset_ns.unwrap_or(0), &folder.join(TOUCHES))
-        {
+        let offset_ns = self.link.offset_ns.unwrap_or(0);
+        if let Err(error) = append_probed_touches(&probed, ball_radius, offset_ns, &folder.join(TOUCHES)) {
             warn!(%error, "the touches of a feature are on the topic alone");
         }
         let is_whole = matches!(probed.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
@@ -452,9 +421,8 @@ impl ArmWorker {
                 warn!(feature = target.id, "what was measured is in the answer, and not among the features");
             }
         }
-        let offset_ns = self.link.offset_ns.unwrap_or(0);
-        for touch in touches_of(target, &probed, &wanted.params, &self.cell, offset_ns, &self.link.setup.shared.frame) {
-            self.port.publish(Publication::ProbeTouch(Box::new(touch)));
+        for touch in touches_of(target, &probed, ball_radius, &self.cell, offset_ns, &self.link.setup.shared.frame) {
+            self.port.publish(Publication::ProbeTouch(touch));
         }
         let mut result = result_of(target, &probed);
         if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.link.common.why_not()) {
