@@ -11,12 +11,12 @@ use crate::mesh::{FaceId, FaceTree, TriMesh};
 use crate::numeric::{DisjointSets, distinct};
 
 /// The closed pieces of a mesh, where there is more than one piece.
+#[derive(Default)]
 pub(super) struct Bodies {
     /// number of the piece of each face; empty where there is one alone
     piece_of: Vec<u32>,
-    /// number of the body of each face, [`NONE`] where a piece has a border; empty where there is one piece alone
-    of_face: Vec<u32>,
-    bodies: Vec<ClosedBody>,
+    /// of each piece, `None` where it has a border; empty where there is one alone
+    bodies: Vec<Option<ClosedBody>>,
 }
 
 struct ClosedBody {
@@ -39,18 +39,14 @@ impl Bodies {
     pub fn of(facets: &Facets) -> Self {
         let (piece_of, pieces) = pieces(facets);
         if pieces.len() < 2 {
-            return Self { piece_of: Vec::new(), of_face: Vec::new(), bodies: Vec::new() };
+            return Self::default();
         }
-        let mut of_face = vec![NONE; piece_of.len()];
-        let mut bodies = Vec::new();
-        let closed =
-            pieces.into_iter().filter(|faces| faces.iter().all(|&f| !facets.beside[f as usize].contains(&NONE)));
-        for faces in closed {
-            let Some(mesh) = part(facets.mesh, &faces) else { continue };
-            faces.iter().for_each(|&face| of_face[face as usize] = bodies.len() as u32);
-            bodies.push(ClosedBody { tree: FaceTree::new(&mesh), mesh, faces });
-        }
-        Self { piece_of, of_face, bodies }
+        let body = |faces: Vec<u32>| {
+            let is_closed = faces.iter().all(|&face| !facets.beside[face as usize].contains(&NONE));
+            let mesh = is_closed.then(|| part(facets.mesh, &faces)).flatten()?;
+            Some(ClosedBody { tree: FaceTree::new(&mesh), mesh, faces })
+        };
+        Self { piece_of, bodies: pieces.into_iter().map(body).collect() }
     }
 
     /// Number of the piece that a face belongs to.
@@ -60,8 +56,7 @@ impl Bodies {
 
     /// What a face sees.
     pub fn around<'a>(&'a self, face: Option<u32>, mesh: &'a TriMesh, tree: &'a FaceTree) -> Surroundings<'a> {
-        let number = face.and_then(|face| self.of_face.get(face as usize)).copied().unwrap_or(NONE);
-        match self.bodies.get(number as usize) {
+        match face.and_then(|face| self.bodies.get(self.piece_of(face) as usize)?.as_ref()) {
             Some(ClosedBody { mesh, tree, faces }) => Surroundings { mesh, tree, faces: Some(faces) },
             None => Surroundings { mesh, tree, faces: None },
         }

@@ -11,7 +11,6 @@ use nalgebra::Point3;
 use super::facets::NONE;
 use super::fit::{Plane, Surface};
 use super::scene::Parted;
-use super::segment::Segmentation;
 use crate::numeric::distinct;
 
 /// A straight edge between two planes.
@@ -78,12 +77,9 @@ pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
     let mut borders = Borders::new();
     for face in 0..of_face.len() as u32 {
         let label = of_face[face as usize];
-        if label == Segmentation::NONE {
-            continue;
-        }
         for (edge, other) in parted.facets.beside(face) {
             let beside = of_face[other as usize];
-            if beside != Segmentation::NONE && label < beside {
+            if beside != NONE && label < beside {
                 let border = Border { ends: parted.facets.edge(face, edge), faces: [face, other] };
                 borders.entry([label, beside]).or_default().push(border);
             }

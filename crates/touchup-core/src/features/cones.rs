@@ -40,10 +40,10 @@ const COVERAGE: f64 = 0.6;
 /// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
 pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
     walls.retain(|wall| !wall.is_cone());
-    let holes: Vec<Wall> = walls.iter().filter(|wall| wall.is_concave() && wall.coverage > COVERAGE).cloned().collect();
+    let holes: Vec<Wall> = walls.iter().filter(|wall| wall.is_concave && wall.coverage > COVERAGE).cloned().collect();
     for wall in holes {
-        for (which, out) in [(0, -1.0), (1, 1.0)] {
-            let Some(segment) = cone_beyond(parted, &wall, wall.ends[which], out) else { continue };
+        for (end, out) in wall.ends.into_iter().zip([-1.0, 1.0]) {
+            let Some(segment) = cone_beyond(parted, &wall, end, out) else { continue };
             let number = parted.segmentation.segments.len();
             let cone = Wall::of_faces(&parted.facets, &segment.primitive, &segment.faces, vec![number]);
             let is_sound = |cone: &Wall| {
@@ -67,7 +67,9 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let start = cone_of(parted, wall, &faces, out)?;
         let faces = faces_on(parted, faces, &start, tolerance.max(FIRST_SLACK * radius));
         let moved = refined(&start, &parted.facets, &faces).filter(|better| is_along(better, wall));
-        let misfit = |cone: &Primitive| misfit(parted, &faces, cone);
+        // sum of the squares by which corners are off a cone, m²
+        let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face));
+        let misfit = |cone: &Primitive| corners().map(|p| cone.distance(&p).powi(2)).sum::<f64>();
         // those of a measured mesh are no better than its facets
         let drawn = parted.rounding.and_then(|_| through_corners(parted, wall, &faces, &start));
         let better = [moved, drawn, Some(start)].into_iter().flatten();
@@ -97,9 +99,8 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
     let sine = median(&mut faces.iter().map(|&face| along(face)).collect::<Vec<_>>())?;
     let is_alike = |face: u32| (along(face) - sine).abs() < ALIKE;
     let alike: Vec<u32> = faces.iter().copied().filter(|&face| is_alike(face)).collect();
-    let is_cone =
-        sine.abs() > SINES[0] && sine.abs() < SINES[1] && alike.len() as f64 > LEAST_SHARE * faces.len() as f64;
-    if !is_cone {
+    let is_steep = sine.abs() > SINES[0] && sine.abs() < SINES[1];
+    if !is_steep || alike.len() as f64 <= LEAST_SHARE * faces.len() as f64 {
         return None;
     }
     let (axis, half_angle) = (wall.axis * (out * sine.signum()), sine.abs().asin());
@@ -134,11 +135,6 @@ fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitiv
     let apex = wall.origin + axis * (mean.x - mean.y / slope);
     let is_cone = slope > 0.0 && apex.coords.iter().all(|x| x.is_finite());
     is_cone.then(|| cone_from(apex, &axis, slope.atan(), wall))
-}
-
-/// Sum of the squares by which corners are off a cone, m².
-fn misfit(parted: &Parted, faces: &[u32], cone: &Primitive) -> f64 {
-    faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| cone.distance(&p).powi(2)).sum()
 }
 
 /// Whether a cone has the axis of its hole.

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::curvature::{VertexCurvature, VertexKind};
-use crate::mesh::{FaceId, TriMesh, VertexId};
+use super::facets::Facets;
+use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::{DisjointSets, voxel_neighbourhood, voxel_of};
 
 /// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
@@ -34,18 +35,15 @@ pub(super) struct Creases {
 impl Creases {
     /// - `sharp_angle`, `sharp_defect`: as in [`super::clusters::ClusterParams`], rad.
     pub fn find(mesh: &TriMesh, curvature: &[VertexCurvature], sharp_angle: f64, sharp_defect: f64) -> Self {
-        let normals: Vec<_> = (0..mesh.face_slots() as u32)
-            .map(|f| if mesh.has_face(FaceId(f)) { mesh.normal(FaceId(f)) } else { Vector3::zeros() })
-            .collect();
+        let facets = Facets::of(mesh);
         let (mut list, mut has_crease) = (Vec::new(), vec![false; mesh.vertex_slots()]);
         let cos_sharp = sharp_angle.cos();
         for (face, corners) in mesh.faces() {
-            for i in 0..3 {
-                let ends = [corners[i], corners[(i + 1) % 3]];
+            for (edge, other) in facets.beside(face.0) {
+                let ends = [corners[edge], corners[(edge + 1) % 3]];
+                let (n, m) = (facets.normal(face.0), facets.normal(other));
                 // once for each edge: the other face runs along it in the opposite direction
-                let Some(other) = (ends[0] < ends[1]).then(|| neighbour(mesh, face, ends)).flatten() else { continue };
-                let (n, m) = (normals[face.0 as usize], normals[other.0 as usize]);
-                if n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {
+                if ends[0] < ends[1] && n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {
                     let along = mesh.position(ends[1]) - mesh.position(ends[0]);
                     let bend = if n.cross(&m).dot(&along) > 0.0 { Bend::Convex } else { Bend::Concave };
                     ends.iter().for_each(|v| has_crease[v.0 as usize] = true);
@@ -99,16 +97,6 @@ impl Creases {
             }
         }
     }
-}
-
-/// The one other face at an edge; `None` on the rim, where there are several, and where it is turned over.
-fn neighbour(mesh: &TriMesh, face: FaceId, [a, b]: [VertexId; 2]) -> Option<FaceId> {
-    let (from, to) = if mesh.star(a).len() <= mesh.star(b).len() { (a, b) } else { (b, a) };
-    let mut others = mesh.faces_at_edge(from, to).filter(|other| *other != face);
-    let (Some(other), None) = (others.next(), others.next()) else { return None };
-    let corners = mesh.corners(other);
-    let is_opposite = (0..3).any(|i| corners[i] == b && corners[(i + 1) % 3] == a);
-    is_opposite.then_some(other)
 }
 
 /// Sorts by key and joins what has the same.

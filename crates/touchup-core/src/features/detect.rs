@@ -1,6 +1,6 @@
 //! From a mesh and touches to features.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
@@ -45,14 +45,14 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let borders = borders(&parted, &of_face);
     let holes = holes(&parted, &walls);
     let (slots, pockets) = slots(&parted, &of_face, &borders);
-    let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(|edge| is_sure(&parted, edge)).collect();
+    let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| is_sure_plane(&parted, number));
+    let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(is_sure).collect();
     let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
     let mut features = Vec::new();
     for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
-        let group = group.map(|number| number as u32);
         features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
@@ -62,14 +62,13 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     features.extend(bosses(&parted, &walls).iter().map(|boss| boss_feature(&measure, &walls, boss)));
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
-    let is_worth = |number: usize| {
-        let area = parted.segment(number).area;
-        is_sure_plane(&parted, number) && area > LEAST_PLANE * parted.diagonal * parted.diagonal
-    };
-    let planes = parted.planes().filter(|&(number, ..)| is_worth(number));
+    let is_large = |number: usize| parted.segment(number).area > LEAST_PLANE * parted.diagonal * parted.diagonal;
+    let planes = parted.planes().filter(|&(number, ..)| is_sure_plane(&parted, number) && is_large(number));
     features.extend(planes.filter_map(|(number, ..)| plane_feature(&measure, number)));
     features.iter_mut().enumerate().for_each(|(id, feature)| feature.id = id as u32);
-    Detection { features, unexplained: unexplained(&parted) }
+    let all: f64 = parted.facets.areas.iter().sum();
+    let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
+    Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
@@ -86,52 +85,34 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
 /// A wall is an end of a slot when width and place agree within this share of the width.
 const ALIKE: f64 = 0.2;
 
-fn unexplained(parted: &Parted) -> f64 {
-    let all: f64 = parted.facets.areas.iter().sum();
-    let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
-    if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 }
-}
-
 fn is_sure_plane(parted: &Parted, number: usize) -> bool {
     let segment = parted.segment(number);
     segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
 }
 
-fn is_sure(parted: &Parted, edge: &StraightEdge) -> bool {
-    edge.planes.iter().all(|&number| is_sure_plane(parted, number))
-}
+/// Where an axis meets a plane, or ends; its uncertainty is along the axis.
+type AxisEnd = Measured<Point3<f64>>;
 
 /// Distance of two places along `direction`, each with its uncertainty.
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
     let touches = distinct(from.touches.iter().chain(&to.touches).copied());
-    Measured { value: (from.point - to.point).dot(direction).abs(), std, touches }
-}
-
-/// Where an axis meets a plane, or ends.
-struct AxisEnd {
-    point: Point3<f64>,
-    /// along the axis, m
-    std: Option<f64>,
-    touches: Vec<u32>,
+    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches }
 }
 
 impl AxisEnd {
     /// Where the axis meets plane number `plane`; else `point`.
     fn on(measure: &Measure, plane: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
-        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| {
-            let (point, std) = fitted.met(point, axis)?;
-            Some(Self { point, std, touches: fitted.touches })
-        });
-        met.unwrap_or_else(|| Self { point: *point, std: None, touches: Vec::new() })
+        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| fitted.met(point, axis));
+        met.unwrap_or_else(|| Self { value: *point, ..Self::default() })
     }
 
     /// As the place of a feature with a fitted surface.
     ///
     /// - `std`: of the place, from the fit, m.
-    fn centre<S>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Measured<Point3<f64>> {
+    fn centre<S>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Self {
         let touches = distinct(fitted.touches.iter().chain(&self.touches).copied());
-        Measured { value: self.point, std: fitted.fit.as_ref().and_then(std), touches }
+        Self { value: self.value, std: fitted.fit.as_ref().and_then(std), touches }
     }
 
     /// Beside numbers that were touched, the uncertainty of the mesh means nothing: no touch confirms it.
@@ -150,7 +131,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
     // beside a wall that was touched, a floor that was not may be a guess
     let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
-    let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.point));
+    let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.value));
     let touched = measure.observed.touched_share(&wall.segments);
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
@@ -177,8 +158,8 @@ fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
 
 /// A hole of which there is no wall: how deep it is and whether it goes through is not known.
 fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
-    let fitted =
-        Fitted { surface: rim.fit.surface, fit: Some(rim.fit.clone()), touches: Vec::new(), to: FittedTo::Mesh };
+    let (surface, fit) = (rim.fit.surface, Some(rim.fit.clone()));
+    let fitted = Fitted { surface, fit, touches: Vec::new(), to: FittedTo::Mesh };
     let centre = Measured { value: rim.centre, std: rim.fit.lateral_std(&rim.centre), touches: Vec::new() };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
@@ -195,7 +176,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let foot = AxisEnd::on(measure, Some(boss.base), &foot, &axis.value);
     let top = fitted.surface.nearest_on_axis(&(boss.foot + boss.out * boss.height));
     let top = AxisEnd::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
-    let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.point));
+    let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.value));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(between(&top, &foot, &axis.value)),
@@ -237,7 +218,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         axis: Some(axis),
         through: Some(slot.through),
         walls: Some(Walls::Slot(fitted.surface)),
-        points: vec![opening.point - half, opening.point + half],
+        points: vec![opening.value - half, opening.value + half],
         ..Feature::new(kind, centre, touched, fitted.to)
     }
 }
@@ -287,7 +268,7 @@ const SPATIAL: f64 = 0.17;
 fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let [a, b, c] = planes.map(|number| measure.plane(number));
     let planes = [a?, b?, c?];
-    let normals = nalgebra::Matrix3::from_rows(&[0, 1, 2].map(|i| planes[i].surface.normal().transpose()));
+    let normals = Matrix3::from_rows(&[0, 1, 2].map(|i| planes[i].surface.normal().transpose()));
     if normals.determinant().abs() < SPATIAL {
         return None;
     }
@@ -295,13 +276,11 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let heights = Vector3::from_fn(|i, _| planes[i].surface.normal().dot(&planes[i].surface.point().coords));
     let point = Point3::from(inverse * heights);
     let stds = [0, 1, 2].map(|i| planes[i].fit.as_ref().and_then(|fit| fit.std_at(&point)));
-    let std = match stds {
-        [Some(s), Some(t), Some(u)] => {
-            let covariance =
-                inverse * nalgebra::Matrix3::from_diagonal(&Vector3::new(s * s, t * t, u * u)) * inverse.transpose();
-            Some(covariance.trace().sqrt())
-        }
-        _ => None,
+    let std = if let [Some(s), Some(t), Some(u)] = stds {
+        let heights = Matrix3::from_diagonal(&Vector3::new(s * s, t * t, u * u));
+        Some((inverse * heights * inverse.transpose()).trace().sqrt())
+    } else {
+        None
     };
     let touches = distinct(planes.iter().flat_map(|plane| plane.touches.iter().copied()));
     let touched = measure.observed.touched_along(&[point, point]);
@@ -312,9 +291,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
 fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
     let fitted = measure.plane(number)?;
     let (point, normal) = measure.observed.parted.plane(number).map(|plane| (plane.point(), plane.normal()))?;
-    let axis = fitted.axis(&normal);
-    let (value, std) = fitted.met(&point, &normal)?;
     let touched = measure.observed.touched_share(&[number]);
-    let centre = Measured { value, std, touches: fitted.touches.clone() };
-    Some(Feature { axis: Some(axis), ..Feature::new(Kind::Plane, centre, touched, fitted.to) })
+    let feature = Feature::new(Kind::Plane, fitted.met(&point, &normal)?, touched, fitted.to);
+    Some(Feature { axis: Some(fitted.axis(&normal)), ..feature })
 }

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is turned over.
+/// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is turned over. Of a face: no segment, no piece.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// All faces of a mesh, by id; each question has an array of its own, so that asking one does not load the others.
@@ -63,15 +63,15 @@ impl<'a> Facets<'a> {
         self.beside[face as usize].into_iter().enumerate().filter(|&(_, other)| other != NONE)
     }
 
-    /// Ends of the edges of a face that have no other face at all, m.
-    pub fn open_edges(&self, face: u32) -> impl Iterator<Item = [Point3<f64>; 2]> + '_ {
+    /// Numbers of the edges of a face that have no other face at all.
+    pub fn open_edges(&self, face: u32) -> impl Iterator<Item = usize> + '_ {
         let corners = self.mesh.corners(FaceId(face));
         let beside = self.beside[face as usize];
         let is_open = move |&edge: &usize| {
             let ends = (corners[edge], corners[(edge + 1) % 3]);
             beside[edge] == NONE && self.mesh.faces_at_edge(ends.0, ends.1).count() == 1
         };
-        (0..3).filter(is_open).map(move |edge| self.edge(face, edge))
+        (0..3).filter(is_open)
     }
 
     pub fn triangle(&self, face: u32) -> [Point3<f64>; 3] {

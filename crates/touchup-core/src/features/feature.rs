@@ -7,7 +7,7 @@ use crate::names;
 
 names! {
     /// What a feature is.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
     pub enum Kind {
         /// round, through or blind; a stepped one is several of one group
         Hole = "hole",
@@ -22,17 +22,19 @@ names! {
         /// where three planes meet
         Corner = "corner",
         /// flat
+        #[default]
         Plane = "plane",
     }
 }
 
 names! {
     /// What the numbers of a feature were fitted to.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum FittedTo {
         /// touches
         Touches = "touches",
         /// the mesh: too little of it was touched
+        #[default]
         Mesh = "mesh",
     }
 }
@@ -49,7 +51,7 @@ pub struct Measured<T> {
 }
 
 /// A feature of the part, in O.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Feature {
     /// stays the same while the feature is refined
     pub id: u32,
@@ -104,47 +106,8 @@ impl Feature {
         sizes.flat_map(|size| size.touches.iter().copied())
     }
 
-    /// A hole of which the wall is known.
-    ///
-    /// - `opening`, `axis`: where the axis goes through it, m in O, and out of it; `touches`: numbers of those of the wall.
-    #[cfg(test)]
-    pub(crate) fn round_hole(
-        opening: Point3<f64>,
-        axis: Vector3<f64>,
-        depth: f64,
-        wall: Cylinder,
-        touches: Vec<u32>,
-    ) -> Self {
-        let diameter = Measured { value: 2.0 * wall.radius, std: Some(1e-5), touches };
-        Self {
-            axis: Some(Measured { value: axis, ..Measured::default() }),
-            diameter: Some(diameter),
-            depth: Some(Measured { value: depth, ..Measured::default() }),
-            walls: Some(Walls::Round(wall)),
-            ..Self::new(Kind::Hole, Measured { value: opening, ..Measured::default() }, 1.0, FittedTo::Touches)
-        }
-    }
-
     /// A feature without numbers but its place.
     pub(super) fn new(kind: Kind, centre: Measured<Point3<f64>>, touched: f64, fitted_to: FittedTo) -> Self {
-        Self {
-            id: 0,
-            kind,
-            centre,
-            axis: None,
-            direction: None,
-            diameter: None,
-            length: None,
-            width: None,
-            depth: None,
-            through: None,
-            cone_angle: None,
-            group: None,
-            points: Vec::new(),
-            is_convex: None,
-            touched,
-            fitted_to,
-            walls: None,
-        }
+        Self { kind, centre, touched, fitted_to, ..Self::default() }
     }
 }

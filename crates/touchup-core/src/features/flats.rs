@@ -1,7 +1,6 @@
 //! The flat pieces of a drawing: faces that lie in one plane and hang together.
 
-use super::facets::Facets;
-use super::segment::Segmentation;
+use super::facets::{Facets, NONE};
 use crate::numeric::flood;
 
 /// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
@@ -30,13 +29,13 @@ pub(super) struct FlatPiece {
 impl Flats {
     /// `None` for a mesh that is no drawing.
     pub fn of(facets: &Facets) -> Option<Self> {
-        is_drawn(facets).then(|| Self { of_face: vec![Segmentation::NONE; facets.slots()], flats: Vec::new() })
+        is_drawn(facets).then(|| Self { of_face: vec![NONE; facets.slots()], flats: Vec::new() })
     }
 
     /// That of a face.
     pub fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
         let known = self.of_face[face as usize];
-        let number = if known == Segmentation::NONE { self.add(facets, face) } else { known };
+        let number = if known == NONE { self.add(facets, face) } else { known };
         &self.flats[number as usize]
     }
 
@@ -46,7 +45,7 @@ impl Flats {
         let beside = |face| facets.beside(face).map(|(_, other)| other);
         let faces = flood(vec![seed], beside, |other| {
             let of_other = &mut self.of_face[other as usize];
-            let is_new = *of_other == Segmentation::NONE && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR;
+            let is_new = *of_other == NONE && 1.0 - normal.dot(&facets.normal(other)) < COPLANAR;
             if is_new {
                 *of_other = number;
             }

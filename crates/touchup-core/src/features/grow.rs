@@ -17,11 +17,11 @@ use crate::numeric::median;
 
 /// Lengths that come with the mesh.
 #[derive(Clone, Copy, Debug)]
-struct MeshScale {
-    /// m
-    diagonal: f64,
-    /// median, m
-    edge: f64,
+pub(super) struct MeshScale {
+    /// of the box around all, m
+    pub diagonal: f64,
+    /// median length of an edge, m
+    pub edge: f64,
 }
 
 /// Rounding of coordinates that were stored in single precision, in diagonals.
@@ -74,9 +74,9 @@ const MOST_NEAR: usize = 50_000;
 const MOST_FITTED: usize = 300;
 
 impl Segmentation {
-    /// Parts `mesh`.
-    pub(super) fn of(facets: &Facets) -> Self {
-        let mut growing = Growing::of(facets);
+    /// Parts a mesh.
+    pub(super) fn of(facets: &Facets, scale: MeshScale) -> Self {
+        let mut growing = Growing::of(facets, scale);
         let mut seeds = growing.seeds();
         let mut flats = Flats::of(facets);
         for (closeness, tolerance) in growing.scale.tolerances(flats.is_some()) {
@@ -112,12 +112,12 @@ struct Growing<'a> {
 }
 
 impl<'a> Growing<'a> {
-    fn of(facets: &'a Facets<'a>) -> Self {
+    fn of(facets: &'a Facets<'a>, scale: MeshScale) -> Self {
         let slots = facets.slots();
         Self {
             facets,
-            scale: MeshScale::of(facets),
-            of_face: vec![Segmentation::NONE; slots],
+            scale,
+            of_face: vec![NONE; slots],
             segments: Vec::new(),
             seen: vec![0; slots],
             round: 0,
@@ -163,7 +163,7 @@ impl<'a> Growing<'a> {
     }
 
     fn is_free(&self, face: u32) -> bool {
-        self.of_face[face as usize] == Segmentation::NONE
+        self.of_face[face as usize] == NONE
     }
 
     fn grow_from(&mut self, seed: u32, flats: Option<&mut Flats>) {
@@ -309,7 +309,7 @@ impl<'a> Growing<'a> {
         let mut primitive = start;
         let mut faces = Vec::new();
         for _ in 0..2 {
-            if !self.belongs(seed, &primitive) {
+            if !belongs(self.facets, seed, &primitive, self.tolerance) {
                 return None;
             }
             faces = self.flood(vec![seed], &mut primitive, near);
@@ -342,7 +342,7 @@ impl<'a> Growing<'a> {
                     continue;
                 }
                 self.seen[other as usize] = self.round;
-                if self.belongs(other, primitive) {
+                if belongs(self.facets, other, primitive, self.tolerance) {
                     found.push(other);
                 }
             }
@@ -362,10 +362,6 @@ impl<'a> Growing<'a> {
             let p = self.facets.triangle(face)[0];
             (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
         })
-    }
-
-    fn belongs(&self, face: u32, primitive: &Primitive) -> bool {
-        belongs(self.facets, face, primitive, self.tolerance)
     }
 
     fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
@@ -401,21 +397,17 @@ impl<'a> Growing<'a> {
     fn claim(&mut self) {
         let mut order = std::mem::take(&mut self.segments);
         order.sort_by(|a, b| a.tolerance.total_cmp(&b.tolerance).then(b.area.total_cmp(&a.area)));
-        self.of_face.fill(Segmentation::NONE);
+        self.of_face.fill(NONE);
         for segment in order {
             self.tolerance = segment.tolerance;
             let mut left: Vec<u32> = segment.faces.iter().copied().filter(|&face| self.is_free(face)).collect();
             if left.is_empty() {
                 continue;
             }
-            let mut primitive = segment.primitive;
-            if left.len() < segment.faces.len() {
-                match self.fitted(&primitive, &left) {
-                    Some(fitted) => primitive = fitted,
-                    None => continue,
-                }
-            }
-            left.retain(|&face| self.belongs(face, &primitive));
+            let is_whole = left.len() == segment.faces.len();
+            let primitive = if is_whole { Some(segment.primitive) } else { self.fitted(&segment.primitive, &left) };
+            let Some(mut primitive) = primitive else { continue };
+            left.retain(|&face| belongs(self.facets, face, &primitive, self.tolerance));
             let fitted = left.len();
             let faces = self.flood(left, &mut primitive, fitted);
             let area = self.facets.area_of(&faces);
@@ -474,9 +466,14 @@ fn power_of_two(x: f64) -> usize {
 }
 
 impl MeshScale {
-    fn of(facets: &Facets) -> Self {
+    /// The edge is the median over a sample of the first edges of faces.
+    pub(super) fn of(facets: &Facets) -> Self {
         let [lo, hi] = facets.mesh.bounds();
-        Self { diagonal: (hi - lo).norm(), edge: median_edge(facets) }
+        let count = facets.slots();
+        let sample = (0..count).step_by((count / 10_000).max(1)).filter(|&face| facets.areas[face] > 0.0);
+        let edges = sample.map(|face| facets.edge(face as u32, 0));
+        let mut lengths: Vec<f64> = edges.map(|[a, b]| (b - a).norm()).collect();
+        Self { diagonal: (hi - lo).norm(), edge: median(&mut lengths).unwrap_or(0.0) }
     }
 
     /// How near the faces around a seed have to be, and how near the others. Tight ones first: what they explain is not left
@@ -506,17 +503,4 @@ impl MeshScale {
         let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(self.exact());
         (closeness, WIDER * closeness)
     }
-}
-
-/// Median over a sample of the first edges of faces, m.
-pub(super) fn median_edge(facets: &Facets) -> f64 {
-    let count = facets.slots();
-    let step = (count / 10_000).max(1);
-    let mut lengths: Vec<f64> = (0..count)
-        .step_by(step)
-        .filter(|&face| facets.areas[face] > 0.0)
-        .map(|face| facets.edge(face as u32, 0))
-        .map(|[a, b]| (b - a).norm())
-        .collect();
-    median(&mut lengths).unwrap_or(0.0)
 }

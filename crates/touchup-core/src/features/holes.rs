@@ -103,14 +103,21 @@ struct WallEnd {
     rim: Option<(usize, f64)>,
 }
 
+impl WallEnd {
+    /// Whether a hollow wall behind it has the same axis.
+    fn goes_on_in(&self, wall: &Wall, other: &Wall) -> bool {
+        let beyond = (other.at(other.middle()) - wall.at(self.t)).dot(&wall.axis) * self.out;
+        other.is_concave && other.is_coaxial(wall, SAME_AXIS) && beyond > 0.0
+    }
+}
+
 /// All round holes.
 pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
-    let is_hole = |wall: &Wall| wall.is_concave() && !wall.is_cone();
-    let found: Vec<Hole> =
-        (0..walls.len()).filter(|&at| is_hole(&walls[at])).filter_map(|at| hole(parted, walls, at)).collect();
-    let is_fragment =
-        |hole: &Hole| found.iter().any(|other| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]));
-    found.iter().filter(|hole| !is_fragment(hole)).cloned().collect()
+    let is_hole = |wall: &Wall| wall.is_concave && !wall.is_cone();
+    let numbers = (0..walls.len()).filter(|&at| is_hole(&walls[at]));
+    let found: Vec<Hole> = numbers.filter_map(|at| hole(parted, walls, at)).collect();
+    let is_of = |hole: &Hole, other: &Hole| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]);
+    found.iter().filter(|hole| !found.iter().any(|other| is_of(hole, other))).cloned().collect()
 }
 
 /// Whether a wall is a fragment of the same hole as a better one: with few touches it is crooked.
@@ -153,14 +160,12 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let rim = on_plane(&open);
     let top = rim.map_or(open.t, |(_, t)| t);
     let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
-    let (bottom, floor) = match other.closed_at {
-        // the tip of a drill: the depth is that of the cylinder
-        Some(_) if tip.is_some() => (other.t, None),
-        Some(t) => match floor_at(parted, wall, t) {
-            Some(floor) => (t, Some(floor)),
-            None => (other.t, None),
-        },
-        None => (on_plane(&other).map_or(other.t, |(_, t)| t), None),
+    // at the tip of a drill the depth is that of the cylinder
+    let closed_at = other.closed_at.filter(|_| tip.is_none());
+    let floor = closed_at.and_then(|t| floor_at(parted, wall, t));
+    let bottom = match other.closed_at {
+        Some(t) => floor.map_or(other.t, |_| t),
+        None => on_plane(&other).map_or(other.t, |(_, t)| t),
     };
     Some(Hole {
         wall: at,
@@ -221,7 +226,7 @@ fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut found);
     let mut torn = [false; AROUND];
     for &FaceId(face) in &found.faces {
-        for [from, to] in parted.facets.open_edges(face) {
+        for [from, to] in parted.facets.open_edges(face).map(|edge| parted.facets.edge(face, edge)) {
             let v = from + (to - from) / 2.0 - middle;
             let (along, aside) = (v.dot(&wall.axis) * end.out, v.cross(&wall.axis).norm());
             if along > -near[0] && along < near[1] && aside < near[1] {
@@ -237,15 +242,10 @@ fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
 /// How much of an opening an end is, beside the other end.
 fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
     let wall = &walls[at];
-    let is_next = |other: &&Wall| {
-        let beyond = (other.at(other.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
-        other.is_concave()
-            && other.coverage >= HOLE_COVERAGE
-            && other.is_coaxial(wall, SAME_AXIS)
-            && other.gap(wall) < SAME_HOLE * wall.radius()
-            && beyond > 0.0
-    };
-    let next = walls.iter().enumerate().filter(|&(number, _)| number != at).map(|(_, other)| other).find(is_next);
+    let is_near = |other: &Wall| other.gap(wall) < SAME_HOLE * wall.radius();
+    let is_next = |other: &&Wall| end.goes_on_in(wall, other) && other.coverage >= HOLE_COVERAGE && is_near(other);
+    let (before, after) = (&walls[..at], &walls[at + 1..]);
+    let next = before.iter().chain(after).find(is_next);
     let stepped = next.map_or(0.0, |next| 2.0 * (next.radius() - wall.radius()).signum());
     stepped + end.rim.map_or(0.0, |(_, share)| share)
 }
@@ -253,16 +253,9 @@ fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
 /// The cone that continues an end.
 fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     let wall = &walls[at];
-    (0..walls.len()).find(|&other| {
-        let cone = &walls[other];
-        let beyond = (cone.at(cone.middle()) - wall.at(end.t)).dot(&wall.axis) * end.out;
-        cone.is_cone()
-            && cone.is_concave()
-            && cone.coverage > HOLE_COVERAGE
-            && cone.is_coaxial(wall, SAME_AXIS)
-            && cone.gap(wall).abs() < SAME_HOLE * wall.radius()
-            && beyond > 0.0
-    })
+    let is_near = |cone: &Wall| cone.gap(wall).abs() < SAME_HOLE * wall.radius();
+    let is_next = |cone: &Wall| cone.is_cone() && cone.coverage > HOLE_COVERAGE && end.goes_on_in(wall, cone);
+    walls.iter().position(|cone| is_next(cone) && is_near(cone))
 }
 
 /// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of the hole broken.
@@ -277,14 +270,13 @@ fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
 }
 
 /// Holes that follow each other on one axis: the group of each, where it has company.
-pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
-    let mut group: Vec<Option<usize>> = vec![None; holes.len()];
+pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
+    let mut group = vec![None; holes.len()];
     for i in 0..holes.len() {
         for j in 0..i {
             let (a, b) = (&walls[holes[i].wall], &walls[holes[j].wall]);
-            let is_next = a.is_coaxial(b, SAME_AXIS) && a.gap(b) < SAME_HOLE * a.radius().max(b.radius());
-            if is_next {
-                let number = group[j].unwrap_or(j);
+            if a.is_coaxial(b, SAME_AXIS) && a.gap(b) < SAME_HOLE * a.radius().max(b.radius()) {
+                let number = group[j].unwrap_or(j as u32);
                 (group[i], group[j]) = (Some(number), Some(number));
             }
         }
@@ -294,7 +286,7 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<usize>> {
 
 /// All round bosses: walls with material inside whose foot is a plane.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
-    let is_boss = |wall: &Wall| !wall.is_concave() && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
+    let is_boss = |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
     (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
 }
 
@@ -311,9 +303,8 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         }
         let to_plane = |number: usize| parted.plane(number)?.along(&wall.origin, &wall.axis);
         let foot = to_plane(base)?;
-        let lid = parted
-            .plane_around(&around, &wall.at(top), &direction, &[FREE * radius], NEAR_END * radius)
-            .map(|(number, _)| number);
+        let lid = parted.plane_around(&around, &wall.at(top), &direction, &[FREE * radius], NEAR_END * radius);
+        let lid = lid.map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
         (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: direction, height, base, top: lid })

@@ -8,7 +8,6 @@ use nalgebra::{Point3, Vector3};
 use super::feature::{FittedTo, Measured};
 use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
 use super::observe::Observed;
-use super::primitive::Primitive;
 use super::slots::Slot;
 use super::walls::Wall;
 use crate::numeric::{order_statistic, spreads, tangent_basis};
@@ -74,14 +73,13 @@ impl<'a> Measure<'a> {
         {
             (axis, axis_sigma) = (plane.surface.normal(), Some(DRILLED));
         }
-        let guess = Cylinder::new(wall.at(wall.middle()), &axis, wall.radius(), wall.is_concave());
+        let guess = Cylinder::new(wall.at(wall.middle()), &axis, wall.radius(), wall.is_concave);
         self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), axis_sigma)
     }
 
     /// The cone of a wall; `None` for a cylinder.
     pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
-        let Primitive::Cone(Cone { half_angle, concave, .. }) = wall.primitive else { return None };
-        let guess = Cone::new(wall.at(wall.middle()), &wall.axis, wall.radius(), half_angle, concave);
+        let guess = Cone::new(wall.at(wall.middle()), &wall.axis, wall.radius(), wall.half_angle?, wall.is_concave);
         Some(self.fitted(&guess, self.touches_around(wall), &self.observed.of_mesh(&wall.segments), None))
     }
 
@@ -181,10 +179,11 @@ impl<'a> Measure<'a> {
 }
 
 impl Fitted<Plane> {
-    /// Where a line meets the plane, and its uncertainty along the normal, m.
-    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<(Point3<f64>, Option<f64>)> {
-        let met = from + direction * self.surface.along(from, direction)?;
-        Some((met, self.fit.as_ref().and_then(|fit| fit.std_at(&met))))
+    /// Where a line meets the plane, m; its uncertainty is along the normal.
+    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
+        let value = from + direction * self.surface.along(from, direction)?;
+        let std = self.fit.as_ref().and_then(|fit| fit.std_at(&value));
+        Some(Measured { value, std, touches: self.touches.clone() })
     }
 }
 

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
+use super::facets::NONE;
 use super::fit::{Observation, Surface};
 use super::marks::NumberSet;
 use super::primitive::Primitive;
 use super::scene::Parted;
-use super::segment::Segmentation;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::{PointGrid, VoxelKey, distinct, voxel_of};
 use crate::stylus::ProbedPoint;
@@ -79,7 +79,7 @@ impl<'a> Observed<'a> {
     fn segment_of(&self, of_face: &[u32], touch: &ProbedPoint) -> Option<usize> {
         let hit = self.parted.tree.closest(self.parted.facets.mesh, &touch.point, self.reach)?;
         let number = of_face[hit.face.0 as usize];
-        if number == Segmentation::NONE {
+        if number == NONE {
             return None;
         }
         let segment = self.parted.segment(number as usize);
@@ -122,17 +122,15 @@ impl<'a> Observed<'a> {
         let sigma = self.parted.rounding.unwrap_or(segment.tolerance) / 6.0;
         let cell = SHARED_EDGES * self.parted.edge;
         let mut cells: BTreeMap<VoxelKey, u32> = BTreeMap::new();
-        let mut observations = Vec::new();
-        for vertex in vertices.into_iter().step_by(step) {
+        let observation = |(own, vertex): (u32, VertexId)| {
             let point = mesh.position(vertex);
-            let own = observations.len() as u32;
             let group = match self.parted.rounding {
                 Some(_) => own,
                 None => *cells.entry(voxel_of(&point, cell)).or_insert(own),
             };
-            observations.push(Observation { point, offset: 0.0, sigma, group });
-        }
-        observations
+            Observation { point, offset: 0.0, sigma, group }
+        };
+        (0..).zip(vertices.into_iter().step_by(step)).map(observation).collect()
     }
 
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
-use super::facets::{Facets, NONE};
+use super::facets::Facets;
 use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit};
 use super::grow::ROUNDING;
 use super::scene::Parted;
@@ -68,10 +68,9 @@ fn loops(facets: &Facets) -> Vec<Loop> {
     let mut next: BTreeMap<VertexId, (VertexId, u32)> = BTreeMap::new();
     let mut forked: Vec<VertexId> = Vec::new();
     for (face, corners) in facets.mesh.faces() {
-        for (i, _) in facets.beside[face.0 as usize].iter().enumerate().filter(|(_, beside)| **beside == NONE) {
-            let (from, to) = (corners[i], corners[(i + 1) % 3]);
-            let is_border = facets.mesh.faces_at_edge(from, to).count() == 1;
-            if is_border && next.insert(from, (to, face.0)).is_some() {
+        for edge in facets.open_edges(face.0) {
+            let (from, to) = (corners[edge], corners[(edge + 1) % 3]);
+            if next.insert(from, (to, face.0)).is_some() {
                 forked.push(from);
             }
         }

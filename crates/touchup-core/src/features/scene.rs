@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::bodies::{Bodies, Surroundings};
-use super::facets::Facets;
+use super::facets::{Facets, NONE};
 use super::fit::Plane;
-use super::grow::median_edge;
+use super::grow::MeshScale;
 use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::tangent_basis;
@@ -36,13 +36,12 @@ const SQUARE: f64 = 0.94;
 impl<'a> Parted<'a> {
     pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
         let facets = Facets::of(mesh);
-        let segmentation = Segmentation::of(&facets);
-        let [lo, hi] = mesh.bounds();
-        let edge = median_edge(&facets);
+        let scale = MeshScale::of(&facets);
+        let segmentation = Segmentation::of(&facets, scale);
         let bodies = Bodies::of(&facets);
         let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
         let rounding = exact.min_by(f64::total_cmp);
-        Self { rounding, facets, bodies, tree, segmentation, diagonal: (hi - lo).norm(), edge }
+        Self { rounding, facets, bodies, tree, segmentation, diagonal: scale.diagonal, edge: scale.edge }
     }
 
     pub fn segment(&self, number: usize) -> &Segment {
@@ -73,7 +72,7 @@ impl<'a> Parted<'a> {
     /// The segment of the face closest to `p`, when one is within `reach`, m.
     pub fn segment_at(&self, around: &Surroundings, p: &Point3<f64>, reach: f64) -> Option<usize> {
         let number = self.segmentation.of_face[around.closest(p, reach)? as usize];
-        (number != Segmentation::NONE).then_some(number as usize)
+        (number != NONE).then_some(number as usize)
     }
 
     /// The plane that most of some rings lie on which faces along `direction`, and its share of them.

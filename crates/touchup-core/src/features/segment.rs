@@ -1,6 +1,6 @@
 //! A mesh parted into pieces that one surface each explains.
 
-use super::facets::Facets;
+use super::facets::{Facets, NONE};
 use super::fit::Surface;
 use super::marks::sort;
 use super::primitive::{Primitive, plane_of};
@@ -26,14 +26,11 @@ pub(crate) struct Segment {
 pub struct Segmentation {
     /// the largest first
     pub segments: Vec<Segment>,
-    /// number of the segment of each face, by id; [`Segmentation::NONE`]: none
+    /// number of the segment of each face, by id; [`NONE`]: none
     pub of_face: Vec<u32>,
 }
 
 impl Segmentation {
-    /// The face is in no segment.
-    pub const NONE: u32 = u32::MAX;
-
     /// Adds a segment, which takes its faces from those that had them; returns its number.
     pub(super) fn add(&mut self, facets: &Facets, mut segment: Segment) -> usize {
         let number = self.segments.len() as u32;
@@ -41,7 +38,7 @@ impl Segmentation {
         let mut poorer = Vec::new();
         for &face in &segment.faces {
             let before = std::mem::replace(&mut self.of_face[face as usize], number);
-            if before != Self::NONE {
+            if before != NONE {
                 self.segments[before as usize].area -= facets.area(face);
                 poorer.push(before);
             }

@@ -6,6 +6,7 @@ use super::borders::{Borders, is_convex};
 use super::facets::NONE;
 use super::fit::{Plane, Surface};
 use super::primitive::Primitive;
+use super::rays::RayHit;
 use super::scene::Parted;
 use crate::numeric::{mean, without_repeats};
 
@@ -216,14 +217,15 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
         return None;
     }
-    let named = |face: crate::mesh::FaceId| of_face[face.0 as usize];
+    let segment_of = |met: Option<RayHit>| {
+        met.map(|met| of_face[met.face.0 as usize]).filter(|&number| number != NONE).map(|number| number as usize)
+    };
     let below = rays.first(&middle, &-out, reach);
     let walls_end = |along: &Vector3<f64>| middles.iter().map(|p| (p - middle).dot(along)).fold(0.0, f64::max);
     // a floor far below belongs to something else
     let deepest = walls_end(&-out) + 2.0 * width;
     let met = below.filter(|met| met.distance < deepest);
-    let floor = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
-    let flat_floor = floor.filter(|&number| is_square(parted, number, &out));
+    let flat_floor = segment_of(met).filter(|&number| is_square(parted, number, &out));
     let down = match (flat_floor, met) {
         (Some(number), _) => parted.plane(number)?.along(&middle, &-out)?,
         (None, Some(met)) => met.distance,
@@ -234,7 +236,7 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     for (at, along) in [direction, -direction].into_iter().enumerate() {
         let met = rays.first(&middle, &along, reach).filter(|met| met.distance < walls_end(&along) + 1.5 * width);
         lengths[at] = met.map_or_else(|| walls_end(&along), |met| met.distance);
-        let number = met.map(|met| named(met.face)).filter(|&number| number != NONE).map(|number| number as usize);
+        let number = segment_of(met);
         let is_flat = number.is_some_and(|number| is_square(parted, number, &along));
         flat += usize::from(is_flat);
         is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &along, &out));

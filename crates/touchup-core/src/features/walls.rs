@@ -11,8 +11,12 @@ use crate::numeric::{median, tangent_basis};
 /// A round wall, perhaps interrupted.
 #[derive(Clone, Debug)]
 pub(super) struct Wall {
-    /// of its largest segment
-    pub primitive: Primitive,
+    /// m
+    radius_at_origin: f64,
+    /// of a cone, rad; `None`: a cylinder
+    pub half_angle: Option<f64>,
+    /// whether the air is on the side of the axis: a hole
+    pub is_concave: bool,
     /// numbers of its segments, the largest first
     pub segments: Vec<usize>,
     /// a point of the axis, m, in O: lengths along it are measured from here
@@ -65,11 +69,10 @@ impl Wall {
 
     /// The wall that these faces are; `None` for a plane.
     pub fn of_faces(facets: &Facets, primitive: &Primitive, faces: &[u32], segments: Vec<usize>) -> Option<Self> {
-        let primitive = *primitive;
-        let (origin, axis, slope) = match primitive {
+        let (origin, axis, radius_at_origin, half_angle, is_concave) = match primitive {
             Primitive::Plane(_) => return None,
-            Primitive::Cylinder(cylinder) => (cylinder.center(), cylinder.axis(), 0.0),
-            Primitive::Cone(cone) => (cone.apex()?, cone.axis(), cone.half_angle),
+            Primitive::Cylinder(wall) => (wall.center(), wall.axis(), wall.radius, None, wall.concave),
+            Primitive::Cone(cone) => (cone.apex()?, cone.axis(), 0.0, Some(cone.half_angle), cone.concave),
         };
         let [e, g] = tangent_basis(&axis);
         let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
@@ -85,22 +88,24 @@ impl Wall {
         // the usual end, not the farthest: walls have ears
         let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
         let [Some(low), Some(high)] = ends else { return None };
-        let wall = Self { primitive, segments, origin, axis, ends: [low, high], coverage, filled: 0.0 };
-        let whole = std::f64::consts::TAU * (wall.radius() / slope.cos()) * wall.height() * coverage;
-        Some(Self { filled: if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 }, ..wall })
+        let ends = [low, high];
+        let mut wall =
+            Self { radius_at_origin, half_angle, is_concave, segments, origin, axis, ends, coverage, filled: 0.0 };
+        let slant = wall.radius() / half_angle.unwrap_or(0.0).cos();
+        let whole = std::f64::consts::TAU * slant * wall.height() * coverage;
+        wall.filled = if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 };
+        Some(wall)
     }
 
     /// Whether `other` is a piece of the same wall.
     fn goes_on_as(&self, other: &Self) -> bool {
-        let is_same = match (self.primitive, other.primitive) {
-            (Primitive::Cylinder(a), Primitive::Cylinder(b)) => (a.radius - b.radius).abs() < SAME_RADIUS * a.radius,
-            (Primitive::Cone(a), Primitive::Cone(b)) => {
-                (a.half_angle - b.half_angle).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius()
-            }
-            _ => return false,
+        let is_same = match (self.half_angle, other.half_angle) {
+            (None, None) => (self.radius() - other.radius()).abs() < SAME_RADIUS * self.radius(),
+            (Some(a), Some(b)) => (a - b).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius(),
+            _ => false,
         };
         is_same
-            && self.is_concave() == other.is_concave()
+            && self.is_concave == other.is_concave
             && self.is_coaxial(other, SAME_RADIUS)
             && self.gap(other) < SAME_WALL * self.radius()
     }
@@ -133,16 +138,6 @@ impl Wall {
         self.ends[1] - self.ends[0]
     }
 
-    /// Whether the air is on the side of the axis: a hole.
-    pub fn is_concave(&self) -> bool {
-        match self.primitive {
-            Primitive::Cylinder(cylinder) => cylinder.concave,
-            Primitive::Cone(cone) => cone.concave,
-            // no wall is one
-            Primitive::Plane(_) => false,
-        }
-    }
-
     /// m; of a cone at mid-height.
     pub fn radius(&self) -> f64 {
         self.radius_at(self.middle())
@@ -150,15 +145,11 @@ impl Wall {
 
     /// m
     pub fn radius_at(&self, t: f64) -> f64 {
-        match self.primitive {
-            Primitive::Cylinder(cylinder) => cylinder.radius,
-            Primitive::Cone(cone) => t * cone.half_angle.tan(),
-            Primitive::Plane(_) => f64::INFINITY,
-        }
+        self.radius_at_origin + self.half_angle.map_or(0.0, |angle| t * angle.tan())
     }
 
     pub fn is_cone(&self) -> bool {
-        matches!(self.primitive, Primitive::Cone(_))
+        self.half_angle.is_some()
     }
 }
 

@@ -4,8 +4,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::surface::{check_size, pose_along, radial, side};
-use super::{Distance, FitError, Freedom, Surface};
+use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side};
+use super::{Distance, FREEDOMS, FitError, Surface};
 use crate::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
@@ -38,17 +38,8 @@ impl Cone {
 }
 
 impl Surface for Cone {
-    const NAME: &'static str = "cone";
-    const FREE: [bool; 8] = [true, true, false, true, true, false, true, true];
-
-    fn name_of(freedom: Freedom) -> &'static str {
-        match freedom {
-            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
-            Freedom::Size => "radius",
-            Freedom::Second => "half angle",
-            _ => "centre",
-        }
-    }
+    const NAMES: [Option<&'static str>; FREEDOMS] =
+        [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, Some("half angle")];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::surface::{check_size, pose_along, radial, side};
-use super::{Distance, Fit, FitError, Freedom, Surface};
+use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side};
+use super::{Distance, FREEDOMS, Fit, FitError, Surface};
 use crate::numeric::mean;
 
 /// A cylinder without ends.
@@ -25,16 +25,7 @@ impl Cylinder {
 }
 
 impl Surface for Cylinder {
-    const NAME: &'static str = "cylinder";
-    const FREE: [bool; 8] = [true, true, false, true, true, false, true, false];
-
-    fn name_of(freedom: Freedom) -> &'static str {
-        match freedom {
-            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
-            Freedom::Size => "radius",
-            _ => "centre",
-        }
-    }
+    const NAMES: [Option<&'static str>; FREEDOMS] = [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, None];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of

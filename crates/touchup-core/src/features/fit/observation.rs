@@ -37,12 +37,12 @@ impl Default for FitParams {
     }
 }
 
+fn positive(what: &'static str, sigma: f64) -> Result<(), FitError> {
+    if sigma > 0.0 && sigma.is_finite() { Ok(()) } else { Err(FitError::BadSigma { what, sigma }) }
+}
+
 impl FitParams {
     pub(super) fn check(&self) -> Result<(), FitError> {
-        let positive = |what, sigma: f64| match sigma > 0.0 && sigma.is_finite() {
-            true => Ok(()),
-            false => Err(FitError::BadSigma { what, sigma }),
-        };
         if !(self.common_sigma >= 0.0 && self.common_sigma.is_finite()) {
             return Err(FitError::BadSigma { what: "common_sigma", sigma: self.common_sigma });
         }
@@ -57,9 +57,7 @@ impl Observation {
             if !(o.point.coords.iter().all(|x| x.is_finite()) && o.offset.is_finite()) {
                 return Err(FitError::NotFinite { index });
             }
-            if !(o.sigma > 0.0 && o.sigma.is_finite()) {
-                return Err(FitError::BadSigma { what: "sigma of an observation", sigma: o.sigma });
-            }
+            positive("sigma of an observation", o.sigma)?;
         }
         Ok(())
     }

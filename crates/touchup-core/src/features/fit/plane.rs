@@ -3,8 +3,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::surface::pose_along;
-use super::{Distance, Fit, FitError, Freedom, Surface};
+use super::{Distance, FREEDOMS, Fit, FitError, Surface};
 use crate::numeric::mean;
+
+const NORMAL: Option<&str> = Some("direction of the normal");
 
 /// A plane whose air is on the side of z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,15 +40,8 @@ impl Plane {
 }
 
 impl Surface for Plane {
-    const NAME: &'static str = "plane";
-    const FREE: [bool; 8] = [false, false, true, true, true, false, false, false];
-
-    fn name_of(freedom: Freedom) -> &'static str {
-        match freedom {
-            Freedom::Z => "position along the normal",
-            _ => "direction of the normal",
-        }
-    }
+    const NAMES: [Option<&'static str>; FREEDOMS] =
+        [None, None, Some("position along the normal"), NORMAL, NORMAL, None, None, None];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of

@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use super::surface::{check_size, pose_along, side};
-use super::{Distance, Fit, FitError, Freedom, Surface};
+use super::surface::{AXIS, check_size, pose_along, side};
+use super::{Distance, FREEDOMS, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
 /// A touch determines an end when its normal has at least this share along the slot: 30° from the wall.
@@ -99,21 +99,18 @@ impl Stadium {
 }
 
 impl Surface for Stadium {
-    const NAME: &'static str = "slot";
-    const FREE: [bool; 8] = [true, true, false, true, true, true, true, true];
+    const NAMES: [Option<&'static str>; FREEDOMS] = [
+        Some("centre along the slot"),
+        Some("centre across the slot"),
+        None,
+        AXIS,
+        AXIS,
+        Some("direction of the slot"),
+        Some("width"),
+        Some("length"),
+    ];
     const NEEDED: [bool; 8] = [false; 8];
     const SECOND_IS_LENGTH: bool = true;
-
-    fn name_of(freedom: Freedom) -> &'static str {
-        match freedom {
-            Freedom::X => "centre along the slot",
-            Freedom::Y | Freedom::Z => "centre across the slot",
-            Freedom::TiltX | Freedom::TiltY => "direction of the axis",
-            Freedom::Turn => "direction of the slot",
-            Freedom::Size => "width",
-            Freedom::Second => "length",
-        }
-    }
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of

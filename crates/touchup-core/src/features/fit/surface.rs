@@ -50,17 +50,14 @@ pub struct Distance {
 
 /// A surface that [`super::fit`] can fit.
 pub trait Surface: Clone {
-    /// What it is called in errors.
-    const NAME: &'static str;
+    /// What each of its freedoms is called in errors; `None`: it has not that one.
+    const NAMES: [Option<&'static str>; FREEDOMS];
     /// The freedoms it has.
-    const FREE: [bool; FREEDOMS];
+    const FREE: [bool; FREEDOMS] = are_named(Self::NAMES);
     /// The freedoms without which a fit of it is worth nothing; the others may come out undetermined.
     const NEEDED: [bool; FREEDOMS] = Self::FREE;
     /// Whether its second size is a length.
     const SECOND_IS_LENGTH: bool = false;
-
-    /// What a freedom is called.
-    fn name_of(freedom: Freedom) -> &'static str;
 
     /// Maps its own frame F to O.
     fn pose_of(&self) -> &Isometry3<f64>;
@@ -145,6 +142,20 @@ pub trait Surface: Clone {
         Self::FREE.iter().filter(|free| **free).count()
     }
 }
+
+const fn are_named(names: [Option<&'static str>; FREEDOMS]) -> [bool; FREEDOMS] {
+    let (mut free, mut at) = ([false; FREEDOMS], 0);
+    while at < FREEDOMS {
+        free[at] = names[at].is_some();
+        at += 1;
+    }
+    free
+}
+
+/// What freedoms of several surfaces are called.
+pub(super) const AXIS: Option<&str> = Some("direction of the axis");
+pub(super) const CENTRE: Option<&str> = Some("centre");
+pub(super) const RADIUS: Option<&str> = Some("radius");
 
 /// Distance of a point from the z axis and the unit vector away from it; x on the axis itself, where every one will do.
 #[inline]

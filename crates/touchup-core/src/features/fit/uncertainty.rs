@@ -58,8 +58,9 @@ impl<M: Surface> Fit<M> {
     /// [`FitError::Undetermined`] when a needed freedom is not fixed, [`FitError::BadSize`].
     pub(super) fn checked(self) -> Result<Self, FitError> {
         let is_open = |freedom: &Freedom| M::NEEDED[*freedom as usize] && self.std(*freedom).is_none();
-        if let Some(freedom) = Freedom::ALL.into_iter().find(is_open) {
-            return Err(FitError::Undetermined { what: M::name_of(freedom) });
+        let open = Freedom::ALL.into_iter().find(is_open);
+        if let Some(what) = open.and_then(|freedom| M::NAMES[freedom as usize]) {
+            return Err(FitError::Undetermined { what });
         }
         self.surface.check()?;
         Ok(self)

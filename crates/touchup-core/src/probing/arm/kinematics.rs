@@ -42,25 +42,16 @@ impl UrGeometry {
 
     /// Of a model, by the name that `ur_type` has in ROS.
     pub fn of(name: &str) -> Option<Self> {
-        match name {
-            "ur3e" => Some(Self::UR3E),
-            "ur5e" => Some(Self::UR5E),
-            "ur10e" => Some(Self::UR10E),
-            "ur16e" => Some(Self::UR16E),
-            _ => None,
-        }
+        let models = [("ur3e", Self::UR3E), ("ur5e", Self::UR5E), ("ur10e", Self::UR10E), ("ur16e", Self::UR16E)];
+        models.into_iter().find(|(model, _)| *model == name).map(|(_, geometry)| geometry)
     }
 
+    /// d, a and α of each, m and rad.
     fn links(&self) -> [(f64, f64, f64); 6] {
         let Self { d1, a2, a3, d4, d5, d6 } = *self;
-        [
-            (d1, 0.0, FRAC_PI_2),
-            (0.0, a2, 0.0),
-            (0.0, a3, 0.0),
-            (d4, 0.0, FRAC_PI_2),
-            (d5, 0.0, -FRAC_PI_2),
-            (d6, 0.0, 0.0),
-        ]
+        let (d, a) = ([d1, 0.0, 0.0, d4, d5, d6], [0.0, a2, a3, 0.0, 0.0, 0.0]);
+        let alpha = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
+        std::array::from_fn(|i| (d[i], a[i], alpha[i]))
     }
 
     /// Pose of the flange in the base B.

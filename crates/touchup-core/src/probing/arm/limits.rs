@@ -143,6 +143,15 @@ impl Limits {
     /// # Errors
     /// [`LimitError::Wider`], [`LimitError::NoLimit`].
     pub fn narrowed(&self, by: &Narrower) -> Result<Self, LimitError> {
+        let narrower = |what, asked: Option<f64>, limit: f64, unit, per_si: f64| match asked {
+            Some(asked) if asked.is_nan() || asked <= 0.0 => {
+                Err(LimitError::NoLimit { what, asked: asked * per_si, unit })
+            }
+            Some(asked) if asked > limit => {
+                Err(LimitError::Wider { what, asked: asked * per_si, limit: limit * per_si, unit })
+            }
+            asked => Ok(asked.unwrap_or(limit)),
+        };
         Ok(Self {
             force: narrower("a force", by.force, self.force, "N", 1.0)?,
             speed: narrower("a speed", by.speed, self.speed, "mm/s", 1e3)?,
@@ -197,23 +206,6 @@ impl Limits {
         let force_n = state.wrench_b.force.norm();
         // what is no number is over every limit
         if force_n <= self.force { Ok(()) } else { Err(LimitError::Force { force_n, limit_n: self.force }) }
-    }
-}
-
-fn narrower(
-    what: &'static str,
-    asked: Option<f64>,
-    limit: f64,
-    unit: &'static str,
-    per_si: f64,
-) -> Result<f64, LimitError> {
-    match asked {
-        None => Ok(limit),
-        Some(asked) if asked.is_nan() || asked <= 0.0 => Err(LimitError::NoLimit { what, asked: asked * per_si, unit }),
-        Some(asked) if asked > limit => {
-            Err(LimitError::Wider { what, asked: asked * per_si, limit: limit * per_si, unit })
-        }
-        Some(asked) => Ok(asked),
     }
 }
 

@@ -148,12 +148,20 @@ const CLEARLY: f64 = 4.0;
 /// # Errors
 /// [`OnsetError`].
 pub fn find_onset(moments: &[TouchMoment], params: &OnsetParams) -> Result<Onset, OnsetError> {
-    check(moments)?;
+    let is_bad = |index: usize| {
+        let m = &moments[index];
+        let is_number = [m.t, m.travel, m.force, m.lateral].iter().all(|x| x.is_finite());
+        !is_number || index > 0 && m.t <= moments[index - 1].t
+    };
+    if let Some(index) = (0..moments.len()).find(|&index| is_bad(index)) {
+        return Err(OnsetError::BadMoment { index });
+    }
     let noise = params.force_noise;
     let mut curve = ForceCurve { moments, path: smoothed(moments), params, noise: [noise, noise] };
     let (free, peak) = curve.free_air()?;
     let start = curve.crossing(free, peak);
-    let stiffness = curve.slope(start, free, peak);
+    let deepest = moments.iter().map(|m| m.travel).fold(f64::NEG_INFINITY, f64::max);
+    let stiffness = (peak - free) / (deepest - start).max(REST);
     let starts = STARTS.map(|by| LineFit::new(start, params.delay + by * params.delay_sigma, free, stiffness));
     let fits = starts.iter().filter_map(|line| curve.fit(*line));
     let (mut line, _) = fits.min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(OnsetError::NoFit)?;
@@ -184,16 +192,6 @@ const B: usize = 2;
 const K: usize = 3;
 
 type LineFit = Vector4<f64>;
-
-fn check(moments: &[TouchMoment]) -> Result<(), OnsetError> {
-    let is_bad = |index: usize| {
-        let m = &moments[index];
-        let is_number = [m.t, m.travel, m.force, m.lateral].iter().all(|x| x.is_finite());
-        !is_number || index > 0 && m.t <= moments[index - 1].t
-    };
-    let bad = (0..moments.len()).find(|&index| is_bad(index));
-    bad.map_or(Ok(()), |index| Err(OnsetError::BadMoment { index }))
-}
 
 /// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a line through more of them. A
 /// speed that is noisy would look like one that changes, and so simulate a delay.
@@ -293,12 +291,6 @@ impl ForceCurve<'_> {
             }
             None => (a.travel + a.speed * since, a.speed),
         }
-    }
-
-    /// First guess of k, N/m.
-    fn slope(&self, start: f64, free: f64, peak: f64) -> f64 {
-        let deepest = self.moments.iter().map(|m| m.travel).fold(f64::NEG_INFINITY, f64::max);
-        (peak - free) / (deepest - start).max(REST)
     }
 
     /// Residual, its derivatives by the unknowns, and whether it is in free air, 0, or pressing, 1.

@@ -92,6 +92,8 @@ struct Slid<'a> {
     target: &'a SlideTarget,
     params: &'a TouchParams,
     station: usize,
+    /// when the ball began to move along and when it was seen last, ns
+    stamps_ns: [i64; 2],
     /// of each state
     forces: Vec<f64>,
     /// states in a row without a surface, and with an obstacle
@@ -174,37 +176,29 @@ impl Slid<'_> {
 impl Watched<'_> {
     /// Slides once. The ball ends clear of the surface, beside the last station reached.
     ///
-    /// - `reached`: the station that the ball is at, also where this breaks off; `None` while it is not at the first.
-    ///
     /// # Errors
     /// [`ProbeError`]; a surface that is not there, or ends, is none.
-    pub fn slide(
-        &mut self,
-        target: &SlideTarget,
-        params: &TouchParams,
-        reached: &mut Option<usize>,
-    ) -> Result<SlideRecord, ProbeError> {
-        self.peak_force = 0.0;
+    pub fn slide(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<SlideRecord, ProbeError> {
+        (self.peak_force, self.reached) = (0.0, None);
         self.line("going to where a slide begins", &target.lifted(0), params.safe_speed(), params, params.trigger)?;
-        *reached = Some(0);
-        let begun_ns = self.next(SLIDING)?.stamp_ns;
+        self.reached = Some(0);
+        let stamps_ns = [self.next(SLIDING)?.stamp_ns; 2];
         let window = (WINDOW / self.arm.period()).ceil() as usize;
-        let mut slid = Slid { target, params, station: 0, forces: Vec::new(), none: 0, against: 0, window };
-        let is_contact = self.find_surface(target, params)?;
-        let mut stamps_ns = [begun_ns; 2];
-        let ending = match is_contact {
-            false => SlideEnding::NoSurface,
-            true => {
-                self.settle(&slid)?;
-                self.go_along(&mut slid, reached, &mut stamps_ns)?
-            }
-        };
-        self.leave(target, slid.station, params)?;
+        let mut slid = Slid { target, params, station: 0, stamps_ns, forces: Vec::new(), none: 0, against: 0, window };
+        let mut ending = SlideEnding::NoSurface;
+        if self.find_surface(target, params)? {
+            self.settle(&slid)?;
+            ending = self.go_along(&mut slid)?;
+        }
+        // off the surface along its normal
+        let leaving = "leaving the surface after a slide";
+        self.halt(leaving, &mut |_| {})?;
+        self.line(leaving, &target.lifted(slid.station), params.safe_speed(), params, self.limits.force)?;
         let mean = |forces: &[f64]| forces.iter().sum::<f64>() / forces.len().max(1) as f64;
         let worst = slid.forces.windows(window).map(|forces| (mean(forces) - params.force).abs()).fold(0.0, f64::max);
         Ok(SlideRecord {
             ending,
-            stamps_ns,
+            stamps_ns: slid.stamps_ns,
             reached: slid.station,
             mean_force: mean(&slid.forces),
             worst_force: worst,
@@ -216,15 +210,11 @@ impl Watched<'_> {
     fn find_surface(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<bool, ProbeError> {
         let normal = target.stations[0].normal.into_inner();
         let mut contacts = 0;
-        self.search(
-            "looking for the surface of a slide",
-            -normal * params.safe_speed(),
-            target.lift + target.give,
-            &mut |state| {
-                contacts = if state.wrench_b.force.norm() > params.trigger { contacts + 1 } else { 0 };
-                contacts >= TRIGGERS
-            },
-        )
+        let (doing, far) = ("looking for the surface of a slide", target.lift + target.give);
+        self.search(doing, -normal * params.safe_speed(), far, &mut |state| {
+            contacts = if state.wrench_b.force.norm() > params.trigger { contacts + 1 } else { 0 };
+            contacts >= TRIGGERS
+        })
     }
 
     /// Presses until the force is what was set.
@@ -233,47 +223,31 @@ impl Watched<'_> {
         let normal = slid.target.stations[0].normal;
         let begun_ns = self.next(doing)?.stamp_ns;
         let mut settled = 0;
-        while settled < slid.window {
-            self.send(doing, &slid.press(&normal, Vector3::zeros()))?;
-            let state = self.next(doing)?;
+        self.repeat(doing, &slid.press(&normal, Vector3::zeros()), None, f64::INFINITY, &mut |state| {
             let off = state.wrench_b.force.dot(&normal) - slid.params.force;
             settled = if off.abs() < SETTLED * slid.params.force { settled + 1 } else { 0 };
-            if (state.stamp_ns - begun_ns) as f64 * 1e-9 > SETTLING {
-                break;
-            }
-        }
-        Ok(())
+            let is_over = (state.stamp_ns - begun_ns) as f64 * 1e-9 > SETTLING;
+            (settled >= slid.window || is_over).then_some(())
+        })
     }
 
-    fn go_along(
-        &mut self,
-        slid: &mut Slid<'_>,
-        reached: &mut Option<usize>,
-        stamps_ns: &mut [i64; 2],
-    ) -> Result<SlideEnding, ProbeError> {
+    fn go_along(&mut self, slid: &mut Slid<'_>) -> Result<SlideEnding, ProbeError> {
         let limit_s = PATIENCE.0 * slid.seconds() + PATIENCE.1;
         let mut state = self.next(SLIDING)?;
-        *stamps_ns = [state.stamp_ns; 2];
+        slid.stamps_ns = [state.stamp_ns; 2];
         while slid.advance(&state.pose_bt.translation.vector) {
-            *reached = Some(slid.station);
+            self.reached = Some(slid.station);
             if let Some(ending) = slid.observe(&state) {
                 return Ok(ending);
             }
-            if (state.stamp_ns - stamps_ns[0]) as f64 * 1e-9 > limit_s {
+            if (state.stamp_ns - slid.stamps_ns[0]) as f64 * 1e-9 > limit_s {
                 return self.too_long(SLIDING, limit_s);
             }
             self.send(SLIDING, &slid.command(&state.pose_bt.translation.vector))?;
             state = self.next(SLIDING)?;
-            stamps_ns[1] = state.stamp_ns;
+            slid.stamps_ns[1] = state.stamp_ns;
         }
-        *reached = Some(slid.station);
+        self.reached = Some(slid.station);
         Ok(SlideEnding::Arrived)
-    }
-
-    /// Off the surface along its normal.
-    fn leave(&mut self, target: &SlideTarget, station: usize, params: &TouchParams) -> Result<(), ProbeError> {
-        let doing = "leaving the surface after a slide";
-        self.halt(doing, &mut |_| {})?;
-        self.line(doing, &target.lifted(station), params.safe_speed(), params, self.limits.force)
     }
 }

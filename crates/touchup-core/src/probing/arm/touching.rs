@@ -11,7 +11,7 @@ use crate::probing::plan::Expected;
 use super::interface::ArmState;
 use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
 use super::touch_params::TouchParams;
-use super::watched::{GOING, ProbeError, TRIGGERS, Watched};
+use super::watched::{ProbeError, TRIGGERS, Watched};
 
 /// A planned touch, in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,13 +72,15 @@ impl Watched<'_> {
     /// # Errors
     /// [`ProbeError`]; a miss is none.
     pub fn touch(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<TouchRecord, ProbeError> {
-        self.peak_force = 0.0;
-        self.line(GOING, &target.standoff_bt, params.safe_speed(), params, params.trigger)?;
-        let begun = self.next(GOING)?.stamp_ns;
-        let line = ApproachLine::of(target);
+        (self.peak_force, self.reached) = (0.0, None);
+        let going = "going to the stand-off";
+        self.line(going, &target.standoff_bt, params.safe_speed(), params, params.trigger)?;
+        let begun = self.next(going)?.stamp_ns;
+        self.reached = Some(0);
+        let line = ApproachLine { start: target.standoff_bt.translation.vector, target, params };
         let travel = target.search.min(self.limits.search);
 
-        let fast = line.direction * params.safe_speed().min(self.limits.speed);
+        let fast = line.along(params.safe_speed().min(self.limits.speed));
         let mut contacts = 0;
         let mut reached = 0.0;
         let mut searched = |watched: &mut Self, doing, far: f64| {
@@ -103,19 +105,23 @@ impl Watched<'_> {
             is_contact = searched(self, "approaching", gone)?;
             self.halt("approaching", &mut |_| {})?;
             if !is_contact {
-                let pressed = self.press(target, params, room + at - gone, &mut states)?;
+                let pressed = self.press(&line, room + at - gone, &mut states)?;
                 gone = self.last.map_or(gone, |state| line.depth(&state)).max(gone);
-                outcome = pressed.then(|| outcome_of(&line, params, &states));
+                outcome = pressed.then(|| line.outcome_of(&states));
             }
         }
         let outcome = match outcome {
             Some(outcome) => outcome,
             None if is_contact || searched(self, "searching", travel - gone)? => {
                 self.halt("stopping at the surface", &mut |_| {})?;
-                let is_free = self.back_off(target, params)?;
-                match is_free && self.press(target, params, SECOND * params.back_off, &mut states)? {
-                    true => outcome_of(&line, params, &states),
-                    false => no_contact(&line, params, &states),
+                let is_free = self.back_off(&line)?;
+                match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
+                    true => line.outcome_of(&states),
+                    // the first search made a contact that the second did not
+                    false => {
+                        let peak_n = states.iter().map(|state| line.presses(state)).fold(0.0, f64::max);
+                        TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
+                    }
                 }
             }
             None => {
@@ -141,8 +147,8 @@ impl Watched<'_> {
     /// Free of the surface again, then a little farther.
     ///
     /// No farther than the stand-off: whether it is free there.
-    fn back_off(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<bool, ProbeError> {
-        let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
+    fn back_off(&mut self, line: &ApproachLine) -> Result<bool, ProbeError> {
+        let (params, slow) = (line.params, line.along(self.slow(line)));
         let way_back = self.last.map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
         let mut free_at = None;
         let is_free = self.search("backing off", -slow * BACK, way_back, &mut |state| {
@@ -158,14 +164,8 @@ impl Watched<'_> {
     /// The measuring search, from just above the surface, in and out; whether it reached the wanted force.
     ///
     /// - `room`: so far away the surface is at most, m.
-    fn press(
-        &mut self,
-        target: &TouchTarget,
-        params: &TouchParams,
-        room: f64,
-        states: &mut Vec<ArmState>,
-    ) -> Result<bool, ProbeError> {
-        let (line, slow) = (ApproachLine::of(target), self.slow(target, params));
+    fn press(&mut self, line: &ApproachLine, room: f64, states: &mut Vec<ArmState>) -> Result<bool, ProbeError> {
+        let (params, slow) = (line.params, line.along(self.slow(line)));
         states.clear();
         let stop_at = params.force - self.overshoot(params, slow.norm());
         let is_pressed = |state: &ArmState| line.presses(state) > stop_at;
@@ -188,8 +188,9 @@ impl Watched<'_> {
         Ok(pressed)
     }
 
-    fn slow(&self, target: &TouchTarget, params: &TouchParams) -> Vector3<f64> {
-        target.direction.into_inner() * params.measure_speed.min(params.safe_speed()).min(self.limits.speed)
+    /// Speed of the measuring search, m/s.
+    fn slow(&self, ApproachLine { params, .. }: &ApproachLine) -> f64 {
+        params.measure_speed.min(params.safe_speed()).min(self.limits.speed)
     }
 
     /// Force by which a search goes beyond where it is stopped, N.
@@ -201,59 +202,54 @@ impl Watched<'_> {
 }
 
 /// The line that a touch is made along.
-struct ApproachLine {
+struct ApproachLine<'a> {
     start: Vector3<f64>,
-    direction: Vector3<f64>,
+    target: &'a TouchTarget,
+    params: &'a TouchParams,
 }
 
-impl ApproachLine {
-    fn of(target: &TouchTarget) -> Self {
-        Self { start: target.standoff_bt.translation.vector, direction: target.direction.into_inner() }
+impl ApproachLine<'_> {
+    /// So much along it.
+    fn along(&self, by: f64) -> Vector3<f64> {
+        self.target.direction.into_inner() * by
     }
 
     /// How far the ball has come, m.
     fn depth(&self, state: &ArmState) -> f64 {
-        (state.pose_bt.translation.vector - self.start).dot(&self.direction)
+        (state.pose_bt.translation.vector - self.start).dot(&self.target.direction)
     }
 
     /// Force against it, N.
     fn presses(&self, state: &ArmState) -> f64 {
-        -state.wrench_b.force.dot(&self.direction)
+        -state.wrench_b.force.dot(&self.target.direction)
     }
 
     fn curve(&self, states: &[ArmState]) -> Vec<TouchMoment> {
         let begun = states.first().map_or(0, |state| state.stamp_ns);
         let moment = |state: &ArmState| {
             let force = self.presses(state);
-            let lateral = (state.wrench_b.force + self.direction * force).norm();
+            let lateral = (state.wrench_b.force + self.along(force)).norm();
             TouchMoment { t: (state.stamp_ns - begun) as f64 * 1e-9, travel: self.depth(state), force, lateral }
         };
         states.iter().map(moment).collect()
     }
-}
 
-/// The outcome of a curve that reached the wanted force.
-fn outcome_of(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
-    let onset = match find_onset(&line.curve(states), &params.onset) {
-        Ok(onset) => onset,
-        Err(error) => return TouchOutcome::Unclear(error),
-    };
-    // the line that the ball went along, by all poses of the curve
-    let aside = states.iter().map(|state| {
-        let gone = state.pose_bt.translation.vector - line.start;
-        gone - line.direction * gone.dot(&line.direction)
-    });
-    let aside = mean(aside);
-    let hard = states.iter().filter(|state| line.presses(state) - onset.bias > 0.5 * onset.peak);
-    let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
-    let centre = Point3::from(line.start + line.direction * onset.travel + aside);
-    TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
-}
-
-/// The first search made a contact that the second did not.
-fn no_contact(line: &ApproachLine, params: &TouchParams, states: &[ArmState]) -> TouchOutcome {
-    let peak_n = states.iter().map(|state| line.presses(state)).fold(0.0, f64::max);
-    TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
+    /// The outcome of a curve that reached the wanted force.
+    fn outcome_of(&self, states: &[ArmState]) -> TouchOutcome {
+        let onset = match find_onset(&self.curve(states), &self.params.onset) {
+            Ok(onset) => onset,
+            Err(error) => return TouchOutcome::Unclear(error),
+        };
+        // the line that the ball went along, by all poses of the curve
+        let aside = mean(states.iter().map(|state| {
+            let gone = state.pose_bt.translation.vector - self.start;
+            gone - self.along(gone.dot(&self.target.direction))
+        }));
+        let hard = states.iter().filter(|state| self.presses(state) - onset.bias > 0.5 * onset.peak);
+        let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
+        let centre = Point3::from(self.start + self.along(onset.travel) + aside);
+        TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
+    }
 }
 
 /// A ball is stopped as well when its whole force is more than this many times the limit along its direction: a wall that it

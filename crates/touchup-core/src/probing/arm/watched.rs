@@ -67,28 +67,6 @@ pub enum ProbeError {
     },
 }
 
-/// What is done first in a touch.
-pub(super) const GOING: &str = "going to the stand-off";
-
-impl ProbeError {
-    /// What was being done.
-    pub fn doing(&self) -> &'static str {
-        match self {
-            Self::Arm { doing, .. }
-            | Self::Limit { doing, .. }
-            | Self::Obstacle { doing, .. }
-            | Self::LowRate { doing, .. }
-            | Self::TooLong { doing, .. }
-            | Self::Cancelled { doing } => doing,
-        }
-    }
-
-    /// Whether a touch that ended so had reached its stand-off.
-    pub(crate) fn was_at_standoff(&self) -> bool {
-        self.doing() != GOING
-    }
-}
-
 /// States with equal stamps before that is a fault.
 const FROZEN: u32 = 5;
 /// States may come this many periods apart.
@@ -128,22 +106,24 @@ pub struct Watched<'a> {
     pub(super) last: Option<ArmState>,
     frozen: u32,
     pub(super) peak_force: f64,
+    /// The station that the ball has come to on the current slide, also where that breaks off; of a touch 0 from its stand-off on.
+    /// `None` while it is not at the first.
+    pub reached: Option<usize>,
+    /// not so for the retraction that ends a cancelled probing
+    pub(crate) is_cancellable: bool,
 }
 
 impl<'a> Watched<'a> {
     /// - `observer`: receives each state, and may cancel.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
-        Self { arm, limits, observer, last: None, frozen: 0, peak_force: 0.0 }
+        let (peak_force, is_cancellable) = (0.0, true);
+        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, is_cancellable }
     }
 
-    /// The largest force of the current touch, or of all lines where there was none, N.
-    pub fn peak_force(&self) -> f64 {
-        self.peak_force
-    }
-
-    /// When the arm was seen last, by its clock, ns; `None` where it was not, or not since the sensor was zeroed.
-    pub(crate) fn seen_ns(&self) -> Option<i64> {
-        self.last.map(|state| state.stamp_ns)
+    /// The largest force of the current touch, or of all lines where there was none, N; and when the arm was seen last, by its clock, ns:
+    /// `None` where it was not, or not since the sensor was zeroed.
+    pub(crate) fn seen(&self) -> (f64, Option<i64>) {
+        (self.peak_force, self.last.map(|state| state.stamp_ns))
     }
 
     /// The next state, if it is valid.
@@ -151,7 +131,7 @@ impl<'a> Watched<'a> {
         let result = self.look(doing);
         if result.is_err() {
             // stop first, report second; where no command gets through, its watchdog stops it
-            let _ = self.arm.command(&Command::Stop { deceleration: self.limits.acceleration });
+            let _ = self.arm.command(&self.stop());
         }
         result
     }
@@ -175,14 +155,42 @@ impl<'a> Watched<'a> {
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
         self.limits.check_state(&state).map_err(|error| ProbeError::Limit { doing, error })?;
-        if self.observer.is_cancelled() {
+        if self.is_cancellable && self.observer.is_cancelled() {
             return Err(ProbeError::Cancelled { doing });
         }
         Ok(state)
     }
 
+    fn stop(&self) -> Command {
+        Command::Stop { deceleration: self.limits.acceleration }
+    }
+
     pub(super) fn send(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
         self.arm.command(command).map_err(|error| ProbeError::Arm { doing, error })
+    }
+
+    /// Repeats a command, as the watchdog of the arm needs it, until a state gives a result.
+    ///
+    /// - `begun_ns`: when the motion began; `None`: with its first state. `limit_s`: it ends within this, or has failed.
+    pub(super) fn repeat<T>(
+        &mut self,
+        doing: &'static str,
+        command: &Command,
+        mut begun_ns: Option<i64>,
+        limit_s: f64,
+        until: &mut dyn FnMut(&ArmState) -> Option<T>,
+    ) -> Result<T, ProbeError> {
+        loop {
+            self.send(doing, command)?;
+            let state = self.next(doing)?;
+            if let Some(result) = until(&state) {
+                return Ok(result);
+            }
+            let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
+            if (state.stamp_ns - begun_ns) as f64 * 1e-9 > limit_s {
+                return self.too_long(doing, limit_s);
+            }
+        }
     }
 
     /// Goes straight to a pose through what should be free air.
@@ -208,28 +216,22 @@ impl<'a> Watched<'a> {
         let turn = begun.pose_bt.rotation.angle_to(&to.rotation);
         let limit_s = PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
         let command = Command::Line { to: *to, speed, acceleration };
-        self.send(doing, &command)?;
         let mut contacts = 0;
-        loop {
-            let state = self.next(doing)?;
+        let obstacle = self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
+            let here = state.pose_bt.translation.vector;
             let force_n = state.wrench_b.force.norm();
             contacts = if force_n > trigger { contacts + 1 } else { 0 };
             if contacts >= TRIGGERS {
-                self.send(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
-                let place_mm = (state.pose_bt.translation.vector * 1e3).into();
-                let is_link = speed > params.safe_speed();
-                return Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link });
+                let (place_mm, is_link) = ((here * 1e3).into(), speed > params.safe_speed());
+                return Some(Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link }));
             }
             let turn = state.pose_bt.rotation.angle_to(&to.rotation);
-            if (state.pose_bt.translation.vector - place).norm() < THERE && turn < TURNED {
-                return Ok(());
-            }
-            if (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9 > limit_s {
-                return self.too_long(doing, limit_s);
-            }
-            // the watchdog of the arm needs the command repeated
-            self.send(doing, &command)?;
+            ((here - place).norm() < THERE && turn < TURNED).then_some(Ok(()))
+        })?;
+        if obstacle.is_err() {
+            self.send(doing, &self.stop())?;
         }
+        obstacle
     }
 
     /// Stops, waits until the arm is at rest, and zeroes the sensor.
@@ -256,41 +258,28 @@ impl<'a> Watched<'a> {
         each: &mut dyn FnMut(&ArmState),
     ) -> Result<(), ProbeError> {
         self.halt(doing, &mut |_| {})?;
-        let command = Command::Stop { deceleration: self.limits.acceleration };
         let mut begun_ns = None;
-        loop {
-            self.send(doing, &command)?;
-            let state = self.next(doing)?;
+        self.repeat(doing, &self.stop(), None, f64::INFINITY, &mut |state| {
             let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
-            if (state.stamp_ns - begun_ns) as f64 * 1e-9 >= seconds {
-                return Ok(());
+            let is_over = (state.stamp_ns - begun_ns) as f64 * 1e-9 >= seconds;
+            if !is_over {
+                each(state);
             }
-            each(&state);
-        }
+            is_over.then_some(())
+        })
     }
 
     /// Stops, and waits until the arm is at rest.
     pub(super) fn halt(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
-        let command = Command::Stop { deceleration: self.limits.acceleration };
         let limit_s = PATIENCE.0 * self.limits.speed / self.limits.acceleration + PATIENCE.1;
-        let (mut places, mut begun_ns) = (VecDeque::new(), None);
-        loop {
-            self.send(doing, &command)?;
-            let state = self.next(doing)?;
-            each(&state);
+        let mut places = VecDeque::new();
+        self.repeat(doing, &self.stop(), None, limit_s, &mut |state| {
+            each(state);
             let place = state.pose_bt.translation.vector;
             places.push_back(place);
-            if places.len() > REST_STATES {
-                let before: Option<Vector3<f64>> = places.pop_front();
-                if before.is_some_and(|before| (place - before).norm() < REST) {
-                    return Ok(());
-                }
-            }
-            let begun_ns = *begun_ns.get_or_insert(state.stamp_ns);
-            if (state.stamp_ns - begun_ns) as f64 * 1e-9 > limit_s {
-                return self.too_long(doing, limit_s);
-            }
-        }
+            let before: Option<Vector3<f64>> = if places.len() > REST_STATES { places.pop_front() } else { None };
+            before.filter(|before| (place - before).norm() < REST).map(|_| ())
+        })
     }
 
     /// Goes on and on until `until` says so; returns whether it did before the travel was over.
@@ -304,24 +293,15 @@ impl<'a> Watched<'a> {
         let command = Command::Velocity { linear: velocity, acceleration: self.limits.acceleration };
         let begun = self.next(doing)?;
         let limit_s = PATIENCE.0 * travel / velocity.norm() + PATIENCE.1;
-        loop {
-            self.send(doing, &command)?;
-            let state = self.next(doing)?;
-            if until(&state) {
-                return Ok(true);
-            }
-            let gone = state.pose_bt.translation.vector - begun.pose_bt.translation.vector;
-            if gone.dot(&velocity) / velocity.norm() >= travel {
-                return Ok(false);
-            }
-            if (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9 > limit_s {
-                return self.too_long(doing, limit_s);
-            }
-        }
+        self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
+            let gone = || state.pose_bt.translation.vector - begun.pose_bt.translation.vector;
+            let is_over = || gone().dot(&velocity) / velocity.norm() >= travel;
+            if until(state) { Some(true) } else { is_over().then_some(false) }
+        })
     }
 
     pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
-        self.send(doing, &Command::Stop { deceleration: self.limits.acceleration })?;
+        self.send(doing, &self.stop())?;
         Err(ProbeError::TooLong { doing, limit_s })
     }
 }

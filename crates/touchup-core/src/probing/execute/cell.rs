@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use super::links::Tool;
 use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
-use crate::probing::arm::{Joints, LimitError, Limits, UrGeometry};
+use crate::probing::arm::UrGeometry;
 
 /// A robot cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,19 +58,5 @@ impl Cell {
         let [low, high] = part.bounds();
         let middle = Point3::new(f64::midpoint(low.x, high.x), f64::midpoint(low.y, high.y), high.z + ABOVE);
         self.pose(&turned_to(&(self.pose_bo.rotation * Vector3::z())), &middle)
-    }
-
-    /// Whether the limits allow the tip there.
-    ///
-    /// # Errors
-    /// As [`Limits::check_pose`].
-    pub fn check(
-        &self,
-        limits: &Limits,
-        rotation: &UnitQuaternion<f64>,
-        centre: &Point3<f64>,
-        near: &Joints,
-    ) -> Result<Joints, LimitError> {
-        limits.check_pose(&self.geometry, &self.pose_ft, &self.pose(rotation, centre), near)
     }
 }

@@ -1,14 +1,14 @@
 //! Dry run: the touches and paths that the current mesh leads to, checked, without moving the arm.
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::Point3;
 
 use super::cell::Cell;
 use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
-use super::route::{ToolState, may_slide, may_touch, route};
-use super::world::{World, distance, normal_about, on_mesh};
+use super::route::{FreeSpace, ToolState};
+use super::world::{World, distance};
 use crate::probing::arm::{ArmState, Joints, LimitError};
-use crate::probing::plan::{ExploreError, Explorer, PatternParams, Slide, TouchPlan, TouchResult};
+use crate::probing::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
 
 /// A planned motion, with its number from 0 on among those of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -59,17 +59,13 @@ pub fn plan(
     flag: &Flag,
     now: &ArmState,
 ) -> Result<Plan, ExploreError> {
-    let place = on_mesh(world, &flag.place);
-    let normal = normal_about(world, &place, &cell.shaft(&now.pose_bt.rotation));
-    let rotation = cell.upright(&now.pose_bt.rotation, &normal);
-    let pattern = PatternParams { flag_radius: flag.radius, ..params.pattern };
-    let mut explorer = Explorer::new(flag.kind, &place, &normal, pattern)?;
-    let clear = distance(world);
+    let (mut explorer, rotation) = flag.explorer(cell, params, world, now)?;
+    let space = FreeSpace { cell, limits: &params.limits, world };
     let mut at = ToolState::of(cell, now);
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
     let reach = |reached: Result<Joints, LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
         let joints = reached?;
-        for (place, turned) in route(cell, &params.limits, world, at, &rotation, above)?.stops {
+        for (place, turned) in space.route(at, &rotation, above)?.stops {
             plan.links.push([at.place, place]);
             plan.path.push(place);
             (at.place, at.rotation) = (place, turned);
@@ -80,13 +76,13 @@ pub fn plan(
     while let Some(planned) = explorer.next_touch() {
         let what = PlannedMotion::Touch(plan.touches.len());
         plan.touches.push(planned);
-        let reached = may_touch(cell, &params.limits, &rotation, &planned, &at.joints);
+        let reached = space.may_touch(&rotation, &planned, &at.joints);
         if let Err(ending) = reach(reached, &planned.entry, &mut at, &mut plan) {
             plan.held_back.push(HeldBack { what, why: ending.why() });
             explorer.take(&TouchResult::Unclear);
             continue;
         }
-        let result = contact_on_mesh(&planned, params.pattern.ball_radius, &clear, params.pattern.touch_sigma);
+        let result = contact_on_mesh(&planned, &params.pattern, world);
         let end = if let TouchResult::At { centre, .. } = result { centre } else { planned.from };
         // in again and out, slowly
         plan.path.extend([planned.from, end, planned.from, at.place]);
@@ -95,7 +91,7 @@ pub fn plan(
     let slides = if params.slides { explorer.slides() } else { Vec::new() };
     for slide in slides {
         let what = PlannedMotion::Slide(plan.slides.len());
-        let reached = may_slide(cell, &params.limits, &rotation, &slide, &at.joints);
+        let reached = space.may_slide(&rotation, &slide, &at.joints);
         match reach(reached, &slide.above(0), &mut at, &mut plan) {
             Ok(()) => {
                 let last = slide.stations.len() - 1;
@@ -111,16 +107,11 @@ pub fn plan(
 }
 
 /// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is left.
-fn contact_on_mesh(
-    planned: &TouchPlan,
-    ball_radius: f64,
-    distance: &dyn Fn(&Point3<f64>, f64) -> f64,
-    sigma: f64,
-) -> TouchResult {
-    let along: Unit<Vector3<f64>> = planned.direction;
+fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
+    let (PatternParams { ball_radius, touch_sigma: sigma, .. }, distance) = (*pattern, distance(world));
     let mut gone = 0.0;
     while gone <= planned.search {
-        let centre = planned.from + along.into_inner() * gone;
+        let centre = planned.from + planned.direction.into_inner() * gone;
         let left = distance(&centre, ball_radius + planned.search) - ball_radius;
         if left < TOUCHES {
             return TouchResult::At { centre, sigma };

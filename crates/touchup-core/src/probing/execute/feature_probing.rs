@@ -1,13 +1,17 @@
-//! A feature that is being probed: the position of the ball, its path back into free air, and its touches.
+//! From a flag to a feature: plan, path, touch, and again.
 
-use nalgebra::{Point3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 
-use super::ending::{ProbedSlide, ProbedTouch};
+use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
+use super::prober::{Flag, ProbeParams, Prober};
 use super::route::ToolState;
-use crate::probing::arm::Watched;
+use super::world::{Phase, Progress, World};
+use crate::probing::arm::{OnsetVerdict, ProbeError, TouchOutcome, TouchRecord, TouchTarget};
+use crate::probing::plan::{ExploreError, Explorer, TouchPlan, TouchResult};
 
-/// A feature that is being probed.
-pub(super) struct FeatureProbing {
+/// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
+pub(super) struct FeatureProbing<'p, 'a> {
+    pub prober: &'p mut Prober<'a>,
     pub flag: u32,
     /// that it is touched with, of the tip in B
     pub rotation: UnitQuaternion<f64>,
@@ -19,6 +23,8 @@ pub(super) struct FeatureProbing {
     pub entry: Option<Point3<f64>>,
     /// where the last search began, m in O; `None` where the ball was not there yet
     pub from: Option<Point3<f64>>,
+    /// whether the sensor is zeroed where it is touched
+    pub is_zeroed: bool,
     pub begun_ns: i64,
     pub ended_ns: i64,
     pub touches: Vec<ProbedTouch>,
@@ -26,31 +32,305 @@ pub(super) struct FeatureProbing {
     pub peak_force: f64,
 }
 
-impl FeatureProbing {
-    /// The next place that the ball goes back through into free air, where it has been before; `None` when it is there.
-    pub fn next_out(&self) -> Option<Point3<f64>> {
-        (!self.is_out).then(|| self.from.or(self.entry).unwrap_or(self.out.place))
-    }
+/// A search that ends this much before its planned length has not searched the remainder, m.
+const SHORT: f64 = 0.1e-3;
+/// Touches that begin nearer than this to each other, over the ball's radius, are gone between inside of the feature.
+const INSIDE: f64 = 0.5;
 
-    /// It has reached that place, and does not go back behind it, whatever breaks off the remaining path.
-    pub fn is_at_next_out(&mut self) {
-        if self.from.take().is_none() && self.entry.take().is_none() {
-            self.is_out = true;
+impl<'a> Prober<'a> {
+    /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has retracted wherever it was still
+    /// allowed to move.
+    pub fn probe(&mut self, flag: &Flag) -> Probed {
+        let (mut explorer, mut probing) = match self.begin(flag) {
+            Ok(begun) => begun,
+            Err(ending) => {
+                let (touches, slides) = (Vec::new(), Vec::new());
+                return Probed { flag: flag.id, ending, found: None, touches, slides, seconds: 0.0, peak_force: 0.0 };
+            }
+        };
+        let mut ended = probing.explore(&mut explorer);
+        if probing.prober.params.slides && ended.is_ok() {
+            ended = probing.slide_over(explorer.slides());
+        }
+        let ended = probing.finish(ended);
+        let found = explorer.found();
+        let ending = match (ended, &found) {
+            (Err(ending), _) => ending,
+            (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
+            // not done: the search did not end
+            (Ok(()), Ok(_) | Err(ExploreError::NotDone { .. })) => Ending::TouchesSpent,
+            (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
+        };
+        Probed {
+            flag: flag.id,
+            ending,
+            found: found.ok(),
+            seconds: probing.seconds(),
+            peak_force: probing.peak_force,
+            touches: probing.touches,
+            slides: probing.slides,
         }
     }
 
-    /// The ball is inside of the feature, and leaves it by these places.
-    pub fn is_inside(&mut self, from: Point3<f64>, entry: Point3<f64>) {
-        (self.from, self.entry) = (Some(from), Some(entry));
+    /// The explorer and where the arm is, when both can begin.
+    pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
+        let state = self.in_free_air()?;
+        let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
+        let probing = FeatureProbing {
+            flag: flag.id,
+            rotation,
+            out: ToolState::of(self.cell, &state),
+            is_out: true,
+            entry: None,
+            from: None,
+            is_zeroed: false,
+            begun_ns: state.stamp_ns,
+            ended_ns: state.stamp_ns,
+            touches: Vec::new(),
+            slides: Vec::new(),
+            peak_force: 0.0,
+            prober: self,
+        };
+        Ok((explorer, probing))
     }
+}
 
-    /// Keeps what was seen while the arm moved, also where that was broken off.
-    pub fn keep(&mut self, watched: &Watched<'_>) {
-        self.peak_force = self.peak_force.max(watched.peak_force());
-        self.ended_ns = watched.seen_ns().unwrap_or(self.ended_ns).max(self.ended_ns);
+impl FeatureProbing<'_, '_> {
+    /// Keeps what was seen while the arm moved, also where that was broken off: the largest force, N, and when it was seen last, ns.
+    pub fn keep(&mut self, (peak_force, seen_ns): (f64, Option<i64>)) {
+        self.peak_force = self.peak_force.max(peak_force);
+        self.ended_ns = seen_ns.unwrap_or(self.ended_ns).max(self.ended_ns);
     }
 
     pub fn seconds(&self) -> f64 {
         (self.ended_ns - self.begun_ns) as f64 * 1e-9
     }
+
+    /// Whether the time for a feature is over.
+    pub fn is_spent(&self) -> bool {
+        self.seconds() > self.prober.params.limits.time
+    }
+
+    /// Retracts, wherever the arm is allowed to move.
+    pub fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
+        use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
+        // a failed retraction outranks these
+        let is_unbroken = matches!(ended, Ok(_) | Err(Cancelled | TimeSpent));
+        let may_move =
+            is_unbroken || matches!(ended, Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. })));
+        let retracted = if may_move { self.retract() } else { Ok(()) };
+        // where nothing comes any more it ended when it was seen last
+        let last = self.prober.arm.next_state();
+        self.ended_ns = last.map_or(self.ended_ns, |state| state.stamp_ns.max(self.ended_ns));
+        match retracted {
+            Err(error) if is_unbroken => Err(error),
+            // the first error is the one to report
+            _ => ended,
+        }
+    }
+
+    /// One touch by itself: there, and back into free air.
+    pub fn touch_and_retract(&mut self, planned: &TouchPlan) -> Result<ProbedTouch, Ending> {
+        // zeroed again for each, as another touch has nothing to do with it
+        self.is_zeroed = false;
+        let (_, touched) = self.go_and_touch(planned)?;
+        self.retract()?;
+        Ok(touched)
+    }
+
+    fn explore(&mut self, explorer: &mut Explorer) -> Result<(), Ending> {
+        while let Some(planned) = explorer.next_touch() {
+            if self.is_spent() {
+                return Err(Ending::TimeSpent);
+            }
+            self.publish(explorer, explorer.touches() + 1);
+            let (result, touch) = match self.go_and_touch(&planned) {
+                Ok(touched) => touched,
+                // the first one is where the feature is
+                Err(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_))) if self.touches.is_empty() => {
+                    return Err(ending);
+                }
+                Err(ending) if ending.is_of_one() => {
+                    let refused = Some(ending.why());
+                    let touch = ProbedTouch { planned, record: None, centre: None, deviation: None, refused };
+                    (TouchResult::Unclear, touch)
+                }
+                Err(ending) => return Err(ending),
+            };
+            explorer.take(&result);
+            self.touches.push(touch);
+        }
+        self.publish(explorer, explorer.touches());
+        Ok(())
+    }
+
+    fn publish(&mut self, explorer: &Explorer, touch: usize) {
+        let (budget, uncertainty) = (self.prober.params.pattern.budget, explorer.uncertainty());
+        self.prober.world.publish(&Progress { flag: self.flag, touch, budget, uncertainty });
+    }
+
+    /// A link move, or one that is guarded, to a pose of the tip in B.
+    fn line(&mut self, doing: &'static str, to: &Isometry3<f64>, guard: LineGuard) -> Result<(), Ending> {
+        let ProbeParams { touch, limits, .. } = self.prober.params;
+        let (speed, trigger) = match guard {
+            LineGuard::Link => (touch.link_speed, LINK_TRIGGER * touch.trigger),
+            LineGuard::Slow => (touch.safe_speed(), touch.trigger),
+            // the part may be in contact
+            LineGuard::Out | LineGuard::Retract => (touch.link_speed, limits.force),
+        };
+        let mut watched = self.prober.watched();
+        watched.is_cancellable = guard != LineGuard::Retract;
+        let moved = watched.line(doing, to, speed, touch, trigger);
+        let seen = watched.seen();
+        self.keep(seen);
+        // however slow a link is, nothing should be there
+        moved.map_err(|error| match (error, guard) {
+            (ProbeError::Obstacle { doing, force_n, place_mm, .. }, LineGuard::Link) => {
+                ProbeError::Obstacle { doing, force_n, place_mm, is_link: true }.into()
+            }
+            (error, _) => error.into(),
+        })
+    }
+
+    /// Brings the ball to where a touch is entered from, and touches.
+    fn go_and_touch(&mut self, planned: &TouchPlan) -> Result<(TouchResult, ProbedTouch), Ending> {
+        self.out.joints = self.prober.space().may_touch(&self.rotation, planned, &self.out.joints)?;
+        let near = INSIDE * self.prober.params.pattern.ball_radius;
+        let is_near = self.from.is_some_and(|from| (from - planned.from).norm() < near);
+        // else it stays inside of the feature
+        if !is_near || planned.from == planned.entry {
+            self.reach(&planned.entry)?;
+        }
+        self.touch(planned)
+    }
+
+    /// Out of the feature, and through free air to a place above it.
+    pub fn reach(&mut self, above: &Point3<f64>) -> Result<(), Ending> {
+        self.prober.world.enter(Phase::Link);
+        self.go_out("going up out of the feature", LineGuard::Out)?;
+        let route = self.prober.space().route(&self.out, &self.rotation, above)?;
+        for (place, rotation) in route.stops {
+            let pose = self.prober.cell.pose(&rotation, &place);
+            self.line("going through free air", &pose, LineGuard::Link)?;
+            (self.out.place, self.out.rotation) = (place, rotation);
+        }
+        self.out.joints = route.joints;
+        if !self.is_zeroed {
+            // again where it is touched: turning the wrist loads its sensor
+            self.prober.world.enter(Phase::Zeroing);
+            self.prober.watched().zero()?;
+            self.is_zeroed = true;
+        }
+        self.is_out = false;
+        if self.out.place != *above {
+            self.prober.world.enter(Phase::Approach);
+            let pose = self.prober.cell.pose(&self.rotation, above);
+            self.line("coming near", &pose, LineGuard::Slow)?;
+            self.entry = Some(*above);
+        }
+        Ok(())
+    }
+
+    fn touch(&mut self, planned: &TouchPlan) -> Result<(TouchResult, ProbedTouch), Ending> {
+        let Prober { cell, params, .. } = *self.prober;
+        let target = TouchTarget {
+            standoff_bt: cell.pose(&self.rotation, &planned.from),
+            direction: Unit::new_normalize(cell.pose_bo.rotation * planned.direction.into_inner()),
+            search: planned.search,
+            expected: planned.expected,
+        };
+        let before = distances(self.prober.world, planned, params.pattern.ball_radius);
+        self.prober.world.enter(Phase::Search);
+        let mut watched = self.prober.watched();
+        let touched = watched.touch(&target, &params.touch);
+        let (seen, reached) = (watched.seen(), watched.reached);
+        self.keep(seen);
+        // where the ball has not been it does not go on the retraction
+        if reached.is_some() {
+            self.from = Some(planned.from);
+        }
+        let (result, touch) = self.probed_touch(*planned, touched?);
+        let deviation = touch.centre.and_then(|centre| deviation(&before, planned, &centre));
+        Ok((result, ProbedTouch { deviation, ..touch }))
+    }
+
+    /// The result for the explorer, and the record of the touch.
+    fn probed_touch(&self, planned: TouchPlan, record: TouchRecord) -> (TouchResult, ProbedTouch) {
+        let (result, refused) = match &record.outcome {
+            TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
+                (TouchResult::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
+            }
+            TouchOutcome::Contact { onset, centre, .. } => {
+                let centre = self.prober.cell.pose_bo.inverse_transform_point(centre);
+                (TouchResult::At { centre, sigma: onset.sigma }, None)
+            }
+            TouchOutcome::Miss { travel } if *travel < planned.search - SHORT => {
+                let why = format!("nothing within {:.1} mm, where the limit of a search ends", travel * 1e3);
+                (TouchResult::Unclear, Some(why))
+            }
+            TouchOutcome::Miss { .. } => (TouchResult::Nothing, None),
+            TouchOutcome::Unclear(error) => (TouchResult::Unclear, Some(error.to_string())),
+        };
+        let centre = if let TouchResult::At { centre, .. } = result { Some(centre) } else { None };
+        (result, ProbedTouch { planned, record: Some(record), centre, deviation: None, refused })
+    }
+
+    /// Out of the feature into free air.
+    fn retract(&mut self) -> Result<(), Ending> {
+        self.prober.world.enter(Phase::Retract);
+        self.go_out("retracting", LineGuard::Retract)
+    }
+
+    /// Back through the places where the ball has been before, none of them twice, whatever breaks off the remaining path.
+    fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
+        while !self.is_out {
+            let place = self.from.or(self.entry).unwrap_or(self.out.place);
+            let pose = self.prober.cell.pose(&self.rotation, &place);
+            self.line(doing, &pose, guard)?;
+            self.is_out = self.from.take().is_none() && self.entry.take().is_none();
+        }
+        Ok(())
+    }
 }
+
+/// Distance of a ball from the mesh at each [`SAMPLED`] of the path of a touch, before the touch moves the mesh; m, positive outside,
+/// `None` where no mesh is near.
+fn distances(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Vec<Option<f64>> {
+    let count = (planned.search / SAMPLED).ceil() as usize + 1;
+    let at = |sample: usize| {
+        let centre = planned.from + planned.direction.into_inner() * (SAMPLED * sample as f64);
+        let hit = world.closest_face(&centre, DEVIATION_REACH)?;
+        let off = centre - hit.point;
+        Some(off.norm().copysign(off.dot(&world.mesh().normal(hit.face))) - ball_radius)
+    };
+    (0..=count).map(at).collect()
+}
+
+/// How far the surface that a ball touched was from the mesh, m, positive outside.
+fn deviation(distances: &[Option<f64>], planned: &TouchPlan, centre: &Point3<f64>) -> Option<f64> {
+    let at = ((centre - planned.from).dot(&planned.direction) / SAMPLED).max(0.0);
+    let sample = at as usize;
+    let (here, next) = ((*distances.get(sample)?)?, (*distances.get(sample + 1)?)?);
+    Some(here + (next - here) * (at - at.floor()))
+}
+
+/// The distance from the mesh is sampled this often along the path of a touch, m: between two of them a wall with a radius of 1 mm bends by 1 µm.
+const SAMPLED: f64 = 0.1e-3;
+
+/// How a line is watched.
+#[derive(Clone, Copy, PartialEq)]
+enum LineGuard {
+    /// fast, where the path is clear
+    Link,
+    /// slow enough for whatever is there
+    Slow,
+    /// where the part may be in contact
+    Out,
+    /// the same at the end, also of a probing that was cancelled
+    Retract,
+}
+
+/// In a fast move the sensor also measures accelerations: more force than this many triggers is an obstacle.
+const LINK_TRIGGER: f64 = 1.5;
+/// The mesh is searched this far from a contact, m.
+const DEVIATION_REACH: f64 = 20e-3;

@@ -12,7 +12,7 @@ use super::cone::{NotReached, Orientation, leaned, rings};
 use super::ending::Ending;
 use super::links::Tool;
 use super::prober::Prober;
-use super::route::{Route, ToolState, route};
+use super::route::{FreeSpace, Route, ToolState};
 use crate::calibrate::{SampleBlock, StaticPose};
 use crate::stylus::Sample;
 
@@ -66,12 +66,13 @@ impl Prober<'_> {
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
         let cell = Cell { tool: Tool { shaft_length: length, ..self.cell.tool }, ..self.cell.clone() };
-        let (routes, not_reached, last) = self.routes(&cell, &home);
+        let space = FreeSpace { cell: &cell, ..self.space() };
+        let (routes, not_reached, last) = routes(&space, &home);
         if routes.len() < FEWEST {
             let why = not_reached.into_iter().next().map_or_else(String::new, |first: NotReached| first.why);
             return Err(PayloadProbeError::TooFew { reached: routes.len(), wanted: orientations().count(), why });
         }
-        let back = route(&cell, &self.params.limits, &*self.world, &last, &home.rotation, &home.place)?;
+        let back = space.route(&last, &home.rotation, &home.place)?;
         let mut segments = Vec::new();
         for route in &routes {
             self.turn_along(route)?;
@@ -83,23 +84,6 @@ impl Prober<'_> {
         }
         self.turn_along(&back)?;
         Ok(PayloadReadings { segments, not_reached })
-    }
-
-    /// The paths from one orientation to the next, the orientations without a path, and where the last path ends.
-    fn routes(&self, cell: &Cell, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
-        let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
-        for orientation in orientations() {
-            let rotation = leaned(&home.rotation, &orientation);
-            match route(cell, &self.params.limits, &*self.world, &at, &rotation, &home.place) {
-                Ok(route) => {
-                    let place = route.stops.last().map_or(at.place, |(place, _)| *place);
-                    at = ToolState { place, rotation, joints: route.joints };
-                    routes.push(route);
-                }
-                Err(ending) => not_reached.push(NotReached { orientation, why: ending.why() }),
-            }
-        }
-        (routes, not_reached, at)
     }
 
     fn turn_along(&mut self, route: &Route) -> Result<(), Ending> {
@@ -130,6 +114,23 @@ impl Prober<'_> {
         watched.zero()?;
         Ok(block.map(|block| (StaticPose { r_wt: r_bt * r_tf, ..block.static_pose() }, block.end_ns)))
     }
+}
+
+/// The paths from one orientation to the next, the orientations without a path, and where the last path ends.
+fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
+    let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
+    for orientation in orientations() {
+        let rotation = leaned(&home.rotation, &orientation);
+        match space.route(&at, &rotation, &home.place) {
+            Ok(route) => {
+                let place = route.stops.last().map_or(at.place, |(place, _)| *place);
+                at = ToolState { place, rotation, joints: route.joints };
+                routes.push(route);
+            }
+            Err(ending) => not_reached.push(NotReached { orientation, why: ending.why() }),
+        }
+    }
+    (routes, not_reached, at)
 }
 
 fn orientations() -> impl Iterator<Item = Orientation> {

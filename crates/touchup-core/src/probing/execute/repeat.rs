@@ -67,16 +67,16 @@ impl Prober<'_> {
     /// # Errors
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
-        self.at_spot(spot, |prober, place, normal, probing| {
+        self.at_spot(spot, |probing, place, normal| {
             let across = tangent_basis(&normal)[0];
-            let from = place + normal.into_inner() * (prober.params.pattern.ball_radius + STANDOFF);
+            let from = place + normal.into_inner() * (probing.prober.params.pattern.ball_radius + STANDOFF);
             let mut touches = Vec::with_capacity(count);
             for touch in 1..=count {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
                 let aside = across * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
                 let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
-                let (onset, centre) = prober.touch_spot(&planned, touch, probing)?;
+                let (onset, centre) = probing.touch_spot(&planned, touch)?;
                 touches.push(SpotTouch {
                     side,
                     height: centre.coords.dot(&normal),
@@ -95,32 +95,30 @@ impl Prober<'_> {
     pub(super) fn at_spot<T>(
         &mut self,
         spot: &Point3<f64>,
-        touch_all: impl FnOnce(&mut Self, Point3<f64>, Unit<Vector3<f64>>, &mut FeatureProbing) -> Result<T, SpotError>,
+        touch_all: impl FnOnce(&mut FeatureProbing, Point3<f64>, Unit<Vector3<f64>>) -> Result<T, SpotError>,
     ) -> Result<T, SpotError> {
         let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
         let (_, mut probing) = self.begin(&flag)?;
-        let place = on_mesh(self.world, spot);
-        let normal = normal_about(self.world, &place, &self.cell.shaft(&probing.rotation));
-        let ended = match touch_all(self, place, normal, &mut probing) {
+        let (cell, world) = (probing.prober.cell, &*probing.prober.world);
+        let place = on_mesh(world, spot);
+        let normal = normal_about(world, &place, &cell.shaft(&probing.rotation));
+        let ended = match touch_all(&mut probing, place, normal) {
             Err(SpotError::Ended(ending)) => Err(ending),
             touched => Ok(touched),
         };
-        self.finish(ended, &mut probing)?
+        probing.finish(ended)?
     }
+}
 
+impl FeatureProbing<'_, '_> {
     /// One touch of a spot, and the centre of the ball then.
     ///
     /// - `touch`: its number, from 1 on.
-    pub(super) fn touch_spot(
-        &mut self,
-        planned: &TouchPlan,
-        touch: usize,
-        probing: &mut FeatureProbing,
-    ) -> Result<(Onset, Point3<f64>), SpotError> {
-        if probing.seconds() > self.params.limits.time {
+    pub fn touch_spot(&mut self, planned: &TouchPlan, touch: usize) -> Result<(Onset, Point3<f64>), SpotError> {
+        if self.is_spent() {
             return Err(Ending::TimeSpent.into());
         }
-        let ProbedTouch { record, centre, refused, .. } = self.touch_and_retract(planned, probing)?;
+        let ProbedTouch { record, centre, refused, .. } = self.touch_and_retract(planned)?;
         match (record.map(|record| record.outcome), centre, refused) {
             (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => Ok((onset, centre)),
             (_, _, why) => {
@@ -147,8 +145,7 @@ impl Repeatability {
 
     /// Standard deviation of one touch, m.
     pub fn deviation(&self) -> f64 {
-        let mean = self.mean(None);
-        let squares: f64 = self.touches.iter().map(|touch| (touch.height - mean).powi(2)).sum();
+        let squares: f64 = self.deviations().iter().map(|off| off.powi(2)).sum();
         (squares / (self.touches.len() as f64 - 1.0)).sqrt()
     }
 

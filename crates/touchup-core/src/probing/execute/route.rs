@@ -40,74 +40,84 @@ const TURN_STEP: f64 = 0.1;
 /// A smaller turn is left out, rad.
 const TURNS: f64 = 1e-6;
 
-/// Whether the arm may be everywhere on the path of a touch; joints for where it ends.
-pub(super) fn may_touch(
-    cell: &Cell,
-    limits: &Limits,
-    rotation: &UnitQuaternion<f64>,
-    planned: &TouchPlan,
-    near: &Joints,
-) -> Result<Joints, LimitError> {
-    let deepest = planned.from + planned.direction.into_inner() * planned.search.min(limits.search);
-    let places = [planned.entry, planned.from, deepest];
-    places.iter().try_fold(*near, |joints, place| cell.check(limits, rotation, place, &joints))
-}
-
 /// Every so many stations of a slide the joints are checked: a millimetre or two.
 const CHECKED: usize = 10;
 
-/// Whether the arm may be everywhere on a slide; joints for where it ends.
-pub(super) fn may_slide(
-    cell: &Cell,
-    limits: &Limits,
-    rotation: &UnitQuaternion<f64>,
-    slide: &Slide,
-    near: &Joints,
-) -> Result<Joints, LimitError> {
-    let last = slide.stations.len() - 1;
-    let checked = (0..last).step_by(CHECKED).chain([last]);
-    let mut joints = cell.check(limits, rotation, &slide.above(0), near)?;
-    for station in checked {
-        for place in [slide.lifted(station), slide.stations[station].centre] {
-            joints = cell.check(limits, rotation, &place, &joints)?;
-        }
-    }
-    cell.check(limits, rotation, &slide.above(last), &joints)
+/// Where an arm goes: a cell, within limits, around the mesh.
+#[derive(Clone, Copy)]
+pub(super) struct FreeSpace<'a> {
+    pub cell: &'a Cell,
+    pub limits: &'a Limits,
+    pub world: &'a dyn World,
 }
 
-/// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
-///
-/// # Errors
-/// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
-pub(super) fn route(
-    cell: &Cell,
-    limits: &Limits,
-    world: &dyn World,
-    at: &ToolState,
-    rotation: &UnitQuaternion<f64>,
-    entry: &Point3<f64>,
-) -> Result<Route, Ending> {
-    let clear = distance(world);
-    let mut route = Route { stops: Vec::new(), joints: at.joints };
-    let mut place = at.place;
-    let turn = at.rotation.rotation_to(rotation);
-    let angle = turn.angle();
-    if let Some(axis) = turn.axis().filter(|_| angle > TURNS) {
-        let turned = |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * at.rotation;
-        let shaft = |share: f64| cell.shaft(&turned(share));
-        let upon = Clearance { tool: &cell.tool, shaft: shaft(0.0), distance: &clear };
-        place = upon.turning_place(&at.place, angle, &shaft)?;
-        let steps = (angle / TURN_STEP).ceil().max(1.0);
-        for step in 0..=steps as usize {
-            route.joints = cell.check(limits, &turned(step as f64 / steps), &place, &route.joints)?;
+impl FreeSpace<'_> {
+    /// Whether the limits allow the ball there; joints for it.
+    ///
+    /// # Errors
+    /// As [`Limits::check_pose`].
+    pub fn check(&self, rotation: &UnitQuaternion<f64>, at: &Point3<f64>, near: &Joints) -> Result<Joints, LimitError> {
+        let Cell { geometry, pose_ft, .. } = self.cell;
+        self.limits.check_pose(geometry, pose_ft, &self.cell.pose(rotation, at), near)
+    }
+
+    /// Whether the arm may be everywhere on the path of a touch; joints for where it ends.
+    pub fn may_touch(
+        &self,
+        rotation: &UnitQuaternion<f64>,
+        planned: &TouchPlan,
+        near: &Joints,
+    ) -> Result<Joints, LimitError> {
+        let deepest = planned.from + planned.direction.into_inner() * planned.search.min(self.limits.search);
+        let places = [planned.entry, planned.from, deepest];
+        places.iter().try_fold(*near, |joints, place| self.check(rotation, place, &joints))
+    }
+
+    /// Whether the arm may be everywhere on a slide; joints for where it ends.
+    pub fn may_slide(
+        &self,
+        rotation: &UnitQuaternion<f64>,
+        slide: &Slide,
+        near: &Joints,
+    ) -> Result<Joints, LimitError> {
+        let last = slide.stations.len() - 1;
+        let checked = (0..last).step_by(CHECKED).chain([last]);
+        let mut joints = self.check(rotation, &slide.above(0), near)?;
+        for station in checked {
+            for place in [slide.lifted(station), slide.stations[station].centre] {
+                joints = self.check(rotation, &place, &joints)?;
+            }
         }
-        route.stops.extend([(place, at.rotation), (place, *rotation)]);
+        self.check(rotation, &slide.above(last), &joints)
     }
-    let clearance = Clearance { tool: &cell.tool, shaft: cell.shaft(rotation), distance: &clear };
-    let entry = clearance.entry(entry)?;
-    for place in clearance.path(&place, &entry, highest(world.mesh(), &clearance.shaft))? {
-        route.joints = cell.check(limits, rotation, &place, &route.joints)?;
-        route.stops.push((place, *rotation));
+
+    /// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
+    ///
+    /// # Errors
+    /// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
+    pub fn route(&self, from: &ToolState, rotation: &UnitQuaternion<f64>, to: &Point3<f64>) -> Result<Route, Ending> {
+        let (cell, clear) = (self.cell, distance(self.world));
+        let mut route = Route { stops: Vec::new(), joints: from.joints };
+        let mut place = from.place;
+        let turn = from.rotation.rotation_to(rotation);
+        let angle = turn.angle();
+        if let Some(axis) = turn.axis().filter(|_| angle > TURNS) {
+            let turned = |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * from.rotation;
+            let shaft = |share: f64| cell.shaft(&turned(share));
+            let upon = Clearance { tool: &cell.tool, shaft: shaft(0.0), distance: &clear };
+            place = upon.turning_place(&from.place, angle, &shaft)?;
+            let steps = (angle / TURN_STEP).ceil().max(1.0);
+            for step in 0..=steps as usize {
+                route.joints = self.check(&turned(step as f64 / steps), &place, &route.joints)?;
+            }
+            route.stops.extend([(place, from.rotation), (place, *rotation)]);
+        }
+        let clearance = Clearance { tool: &cell.tool, shaft: cell.shaft(rotation), distance: &clear };
+        let entry = clearance.entry(to)?;
+        for place in clearance.path(&place, &entry, highest(self.world.mesh(), &clearance.shaft))? {
+            route.joints = self.check(rotation, &place, &route.joints)?;
+            route.stops.push((place, *rotation));
+        }
+        Ok(route)
     }
-    Ok(route)
 }

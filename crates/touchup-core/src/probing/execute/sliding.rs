@@ -6,22 +6,17 @@ use super::ending::{Ending, ProbedSlide};
 use super::feature_probing::FeatureProbing;
 use super::links::Clearance;
 use super::prober::Prober;
-use super::route::may_slide;
 use super::world::{Phase, distance};
 use crate::probing::arm::SlideTarget;
 use crate::probing::plan::{Slide, Station};
 
-impl Prober<'_> {
+impl FeatureProbing<'_, '_> {
     /// Slides along each path in turn, as long as there is time. What cannot be slid over is recorded with its reason.
-    pub(super) fn slide_over(&mut self, slides: Vec<Slide>, probing: &mut FeatureProbing) -> Result<(), Ending> {
+    pub fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide { slide: slide.clone(), record: None, refused: Some(why) };
-            if probing.seconds() > self.params.limits.time {
-                probing.slides.push(held_back("the time is spent".to_owned()));
-                continue;
-            }
-            let slid = self.slide(&slide, probing);
-            probing.slides.push(match slid {
+            let slid = if self.is_spent() { Ok(held_back("the time is spent".to_owned())) } else { self.slide(&slide) };
+            self.slides.push(match slid {
                 Ok(probed) => probed,
                 Err(ending) if ending.is_of_one() => held_back(ending.why()),
                 Err(ending) => return Err(ending),
@@ -30,42 +25,43 @@ impl Prober<'_> {
         Ok(())
     }
 
-    fn slide(&mut self, slide: &Slide, probing: &mut FeatureProbing) -> Result<ProbedSlide, Ending> {
-        may_slide(self.cell, &self.params.limits, &probing.rotation, slide, &probing.out.joints)?;
-        self.reach(&slide.above(0), probing, &mut true)?;
+    fn slide(&mut self, slide: &Slide) -> Result<ProbedSlide, Ending> {
+        let Prober { cell, params, .. } = *self.prober;
+        self.prober.space().may_slide(&self.rotation, slide, &self.out.joints)?;
+        // after the touches
+        self.is_zeroed = true;
+        self.reach(&slide.above(0))?;
         let in_b = |station: &Station| Station {
-            centre: self.cell.pose_bo * station.centre,
-            normal: Unit::new_normalize(self.cell.pose_bo.rotation * station.normal.into_inner()),
+            centre: cell.pose_bo * station.centre,
+            normal: Unit::new_normalize(cell.pose_bo.rotation * station.normal.into_inner()),
         };
         let target = SlideTarget {
-            rotation: probing.rotation,
+            rotation: self.rotation,
             stations: slide.stations.iter().map(in_b).collect(),
             lift: slide.lift,
-            give: self.params.pattern.ball_radius,
+            give: params.pattern.ball_radius,
         };
-        self.world.enter(Phase::Slide);
-        let mut reached = None;
-        let touch = &self.params.touch;
-        let mut watched = self.watched();
-        let slid = watched.slide(&target, touch, &mut reached);
-        probing.keep(&watched);
+        self.prober.world.enter(Phase::Slide);
+        let mut watched = self.prober.watched();
+        let slid = watched.slide(&target, &params.touch);
+        let (seen, reached) = (watched.seen(), watched.reached);
+        self.keep(seen);
         if let Some(station) = reached {
-            self.leave_from(slide, station, probing);
+            self.leave_from(slide, station);
         }
         Ok(ProbedSlide { slide: slide.clone(), record: Some(slid?), refused: None })
     }
 
     /// The retraction is straight up from where the slide ended.
-    fn leave_from(&self, slide: &Slide, station: usize, probing: &mut FeatureProbing) {
+    fn leave_from(&mut self, slide: &Slide, station: usize) {
         let above = slide.above(station);
-        probing.is_inside(slide.lifted(station), above);
-        let clear = distance(&*self.world);
+        (self.from, self.entry) = (Some(slide.lifted(station)), Some(above));
+        let space = self.prober.space();
         // where nothing says that it is clear there, it goes back to where it came from
-        let shaft = self.cell.shaft(&probing.rotation);
-        let clearance = Clearance { tool: &self.cell.tool, shaft, distance: &clear };
-        let Ok(place) = clearance.entry(&above) else { return };
-        if let Ok(joints) = self.cell.check(&self.params.limits, &probing.rotation, &place, &probing.out.joints) {
-            (probing.out.place, probing.out.joints) = (place, joints);
+        let (tool, shaft) = (&space.cell.tool, space.cell.shaft(&self.rotation));
+        let Ok(place) = Clearance { tool, shaft, distance: &distance(space.world) }.entry(&above) else { return };
+        if let Ok(joints) = space.check(&self.rotation, &place, &self.out.joints) {
+            (self.out.place, self.out.joints) = (place, joints);
         }
     }
 }

@@ -37,8 +37,9 @@ impl Prober<'_> {
     /// # Errors
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn measure_tip(&mut self, spot: &Point3<f64>) -> Result<TipPoses, SpotError> {
-        self.at_spot(spot, |prober, place, normal, probing| {
-            let normal_b = Unit::new_normalize(prober.cell.pose_bo.rotation * normal.into_inner());
+        self.at_spot(spot, |probing, place, normal| {
+            let Prober { cell, params, .. } = *probing.prober;
+            let normal_b = Unit::new_normalize(cell.pose_bo.rotation * normal.into_inner());
             let mut measured = TipPoses { poses_bf: Vec::new(), normal_b, not_reached: Vec::new() };
             let [u, v] = tangent_basis(&normal).map(|across| across * ASIDE);
             let around = [u, v, -u, -v].map(|aside| (Orientation { lean: 0.0, towards: 0.0 }, aside));
@@ -46,13 +47,13 @@ impl Prober<'_> {
             let upright = probing.rotation;
             for (orientation, aside) in around.into_iter().chain(leaning) {
                 probing.rotation = leaned(&upright, &orientation);
-                let from = place + normal.into_inner() * (prober.params.pattern.ball_radius + STANDOFF) + aside;
+                let from = place + normal.into_inner() * (params.pattern.ball_radius + STANDOFF) + aside;
                 let entry = from + normal.into_inner() * ABOVE;
                 let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
-                match prober.touch_spot(&planned, measured.poses_bf.len() + 1, probing) {
+                match probing.touch_spot(&planned, measured.poses_bf.len() + 1) {
                     Ok((_, centre)) => {
-                        let tip = prober.cell.pose(&probing.rotation, &centre);
-                        let rotation = tip.rotation * prober.cell.pose_ft.rotation.inverse();
+                        let tip = cell.pose(&probing.rotation, &centre);
+                        let rotation = tip.rotation * cell.pose_ft.rotation.inverse();
                         measured.poses_bf.push(Isometry3::from_parts(tip.translation, rotation));
                     }
                     Err(SpotError::Ended(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))) => {

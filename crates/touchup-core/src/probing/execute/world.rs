@@ -97,15 +97,9 @@ pub(super) fn distance(world: &dyn World) -> impl Fn(&Point3<f64>, f64) -> f64 {
 /// their area; where there are none, the shaft.
 pub(super) fn normal_about(world: &dyn World, flag: &Point3<f64>, shaft: &Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
     let mesh = world.mesh();
-    let mut sum = Vector3::zeros();
-    for (face, _) in mesh.faces() {
-        let [a, b, c] = mesh.triangle(face);
-        let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-        let area = (b - a).cross(&(c - a));
-        if (middle - flag).norm() < AROUND && area.dot(shaft) > ALIKE * area.norm() {
-            sum += area;
-        }
-    }
+    let near = mesh.faces().filter(|(face, _)| (mesh.barycentre(*face) - flag).norm() < AROUND);
+    let areas = near.map(|(face, _)| mesh.double_area_normal(face));
+    let sum: Vector3<f64> = areas.filter(|area| area.dot(shaft) > ALIKE * area.norm()).sum();
     Unit::try_new(sum, 0.0).unwrap_or(*shaft)
 }
 

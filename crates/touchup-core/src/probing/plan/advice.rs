@@ -77,15 +77,11 @@ fn best<M: Surface>(
     // the frame of the walls is somewhere on their axis
     let on_axis = Point3::from(pose_of.translation.vector);
     let opening = on_axis + axis * axis.dot(&(feature.centre.value - on_axis));
-    let all: Vec<NextTouch> = DOWN
-        .iter()
-        .flat_map(|share| {
-            places.iter().map(move |(place, out)| NextTouch {
-                place: opening + pose_of.rotation * place + up * (share * depth),
-                normal: pose_of.rotation * out * sign,
-            })
-        })
-        .collect();
+    let at = |share: f64, (place, out): &(Vector3<f64>, Vector3<f64>)| NextTouch {
+        place: opening + pose_of.rotation * place + up * (share * depth),
+        normal: pose_of.rotation * out * sign,
+    };
+    let all: Vec<NextTouch> = DOWN.iter().flat_map(|share| places.iter().map(move |place| at(*share, place))).collect();
     let candidate = |next: &NextTouch| Candidate { point: next.place, sigma: PLACE_SIGMA };
     let mut is_touched = vec![false; all.len()];
     for number in feature.touch_numbers() {
@@ -95,14 +91,13 @@ fn best<M: Surface>(
         is_touched[nearest] = true;
     }
     let before = Knowledge::before::<M>(radius, SQUARE);
-    let made = all.iter().zip(&is_touched).filter(|(_, is_touched)| **is_touched).map(|(next, _)| candidate(next));
-    let known = made.fold(before, |known, touch| known.with(surface, &touch));
+    let made = all.iter().zip(&is_touched).filter(|(_, is_touched)| **is_touched);
+    let known = made.fold(before, |known, (next, _)| known.with(surface, &candidate(next)));
     if known.worst(asked) <= 1.0 {
         return None;
     }
-    let open: Vec<usize> = (0..all.len()).filter(|&at| !is_touched[at]).collect();
-    let candidates: Vec<Candidate> = open.iter().map(|&at| candidate(&all[at])).collect();
-    known.best(surface, &candidates, asked).map(|best| all[open[best]])
+    let open = all.iter().zip(&is_touched).filter(|(_, is_touched)| !**is_touched).map(|(next, _)| *next);
+    known.best(surface, open, candidate, asked).map(|(best, _)| best)
 }
 
 #[cfg(test)]
@@ -110,6 +105,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
+    use crate::features::Measured;
     use crate::features::fit::Cylinder;
 
     /// A hole Ø 8 at the origin, 10 deep, out of its opening along z; and touches of its wall.
@@ -127,7 +123,15 @@ mod tests {
             .collect();
         let wall = Cylinder::new(Point3::new(0.0, 0.0, -3e-3), &Vector3::z(), 4e-3, true);
         let numbers = (0..touches.len() as u32).collect();
-        (Feature::round_hole(Point3::origin(), Vector3::z(), 10e-3, wall, numbers), touches)
+        let feature = Feature {
+            kind: Kind::Hole,
+            axis: Some(Measured { value: Vector3::z(), ..Measured::default() }),
+            diameter: Some(Measured { value: 2.0 * wall.radius, std: Some(1e-5), touches: numbers }),
+            depth: Some(Measured { value: 10e-3, ..Measured::default() }),
+            walls: Some(Walls::Round(wall)),
+            ..Feature::default()
+        };
+        (feature, touches)
     }
 
     #[test]

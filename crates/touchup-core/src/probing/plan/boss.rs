@@ -1,6 +1,6 @@
 //! A boss from one flag: its top, where the ground begins beside it in three directions, then its wall from outside.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::error::ExploreError;
@@ -11,6 +11,7 @@ use super::search_context::{RING, SearchContext, TouchPlan, TouchResult, toward}
 use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::Observation;
+use crate::numeric::mean;
 
 /// The distance of the search outward grows by this factor.
 const FARTHER: f64 = 1.4;
@@ -76,10 +77,8 @@ impl BossPattern {
         if top.len() < 3 {
             context.height = places.iter().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
         }
-        let high: Vec<_> = places.into_iter().filter(|p| (context.below(p) - context.height).abs() < FLAT).collect();
-        let sum = high.iter().map(|place| place.coords).sum::<Vector3<f64>>();
-        self.wall.middle = Point3::from(sum / high.len().max(1) as f64);
-        self.wall.middle.z = 0.0;
+        let high = places.iter().filter(|p| (context.below(p) - context.height).abs() < FLAT);
+        self.wall.middle = mean(high.map(|place| Vector3::new(place.x, place.y, 0.0))).into();
         self.seen = top;
         self.phase = BossPhase::Out(context.params.flag_radius + context.params.ball_radius);
     }
@@ -88,8 +87,7 @@ impl BossPattern {
         let ball = context.params.ball_radius;
         let lowest = context.height - GROUND * ball;
         let z = touch.place.map_or(lowest, |place| context.below(&place));
-        let is_beside = touch.result != TouchResult::Unclear && context.height - z > BESIDE * ball;
-        if is_beside {
+        if touch.result != TouchResult::Unclear && context.height - z > BESIDE * ball {
             self.ground_z = self.ground_z.max(z);
             self.phase = BossPhase::In(distance);
         } else {
@@ -107,12 +105,11 @@ impl BossPattern {
         }
         self.direction += 1;
         let reached = touch.place.map_or(distance, |place| (place - self.wall.middle).xy().norm());
-        self.phase = match self.wall.measuring.observations.len() < FIRST {
-            true => BossPhase::Out(reached + context.params.clearance),
-            false => BossPhase::Ground,
-        };
-        if self.phase == BossPhase::Ground {
+        if self.wall.measuring.observations.len() < FIRST {
+            self.phase = BossPhase::Out(reached + context.params.clearance);
+        } else {
             self.wall.recentre(context);
+            self.phase = BossPhase::Ground;
         }
     }
 }
@@ -128,18 +125,14 @@ impl Stage for BossPattern {
             }
             BossPhase::Out(distance) => context.down(&(middle + outward * distance), clearance + GROUND * ball),
             BossPhase::In(distance) => {
-                let [_, depth] = self.depths(context)?;
-                context.sideways(&(middle + outward * distance), depth, &-outward, distance)
+                context.sideways(&(middle + outward * distance), self.depths(context)?[1], &-outward, distance)
             }
             BossPhase::Ground => {
                 let away = self.wall.radius(context) + 2.0 * BESIDE * ball;
                 let place = middle + toward((self.around as f64 + 0.5) / AROUND as f64) * away;
                 context.down(&place, clearance + GROUND * ball)
             }
-            BossPhase::Wall => {
-                let depths = self.depths(context)?;
-                return Ok(self.wall.next(context, depths));
-            }
+            BossPhase::Wall => return Ok(self.wall.next(context, self.depths(context)?)),
         }))
     }
 

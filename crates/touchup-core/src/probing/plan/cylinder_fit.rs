@@ -9,7 +9,7 @@ use super::error::ExploreError;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::Touched;
 use super::search_context::{Quantity, SearchContext, TouchPlan, toward};
-use super::slide::{RimStation, Slide, circle};
+use super::slide::{RimStation, Slide};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
 use crate::numeric::{NormalEquations, mean};
 
@@ -93,13 +93,14 @@ impl RoundWall {
             asked: asked.and_the_rest::<Cylinder>(sigma, guess.radius),
             fit: square(),
             least: LEAST_WALL,
+            params: context.params,
         }
     }
 
     /// Standard uncertainty of the requested number, m or rad.
     pub fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let guess = self.guess(context);
-        self.measuring.uncertainty(&guess, &self.wanted(context, &guess), &context.params)
+        self.measuring.uncertainty(&guess, &self.wanted(context, &guess))
     }
 
     /// The touch of the wall with the largest gain.
@@ -121,7 +122,7 @@ impl RoundWall {
             Possible { point, travel, planned }
         });
         let wanted = self.wanted(context, &surface);
-        self.measuring.next(&surface, &wanted, possible, &context.params)
+        self.measuring.next(&surface, &wanted, possible.collect())
     }
 
     /// The cylinder through the contacts of the wall, perpendicular to a surface.
@@ -137,8 +138,9 @@ impl RoundWall {
     pub fn slides(&self, context: &SearchContext, back: f64, depths: [f64; 2], room: f64) -> Vec<Slide> {
         let radius = self.radius(context);
         let middle = Point3::new(self.middle.x, self.middle.y, context.height);
+        // the open is around a boss, and inside of a hole
         let side = if self.is_boss { 1.0 } else { -1.0 };
-        let at = &circle(middle, radius, side);
+        let at = &|share: f64| (middle + toward(share) * radius, toward(share) * side);
         RimStation { at, length: TAU * radius, is_closed: true, back, depths, room }.slides(context)
     }
 }

@@ -111,10 +111,19 @@ impl Knowledge {
         reduction / (touch.sigma.powi(2) + g.dot(&cg))
     }
 
-    /// The candidate with the largest gain, the first among equals; `None` when none has a gain.
-    pub fn best<M: Surface>(&self, surface: &M, candidates: &[Candidate], asked: &Asked) -> Option<usize> {
-        let gains = candidates.iter().map(|touch| self.gain(surface, touch, asked)).enumerate();
-        let some = gains.filter(|(_, gain)| *gain > 0.0);
-        some.reduce(|best, next| if next.1 > best.1 { next } else { best }).map(|(index, _)| index)
+    /// The candidate with the largest gain, the first among equals, and its gain; `None` when none has a gain.
+    ///
+    /// - `touch`: that a candidate stands for.
+    pub fn best<M: Surface, T>(
+        &self,
+        surface: &M,
+        candidates: impl IntoIterator<Item = T>,
+        touch: impl Fn(&T) -> Candidate,
+        asked: &Asked,
+    ) -> Option<(T, f64)> {
+        let gain = |candidate: &T| self.gain(surface, &touch(candidate), asked);
+        let gains = candidates.into_iter().map(|candidate| (gain(&candidate), candidate));
+        let best = gains.filter(|(gain, _)| *gain > 0.0).reduce(|best, next| if next.0 > best.0 { next } else { best });
+        best.map(|(gain, candidate)| (candidate, gain))
     }
 }

@@ -2,13 +2,12 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::{Stage, Touched};
 use super::search::ROUGH;
-use super::search_context::{PatternParams, Quantity, RING, SearchContext, TouchPlan, TouchResult};
+use super::search_context::{PatternParams, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
 use crate::features::fit::{FitParams, Freedom, Observation, Plane, fit};
@@ -99,10 +98,7 @@ impl EdgePattern {
         context.height = ring().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
         let is_low = |p: &&Point3<f64>| context.height - context.below(p) > BEYOND * context.params.ball_radius;
         let (low, high): (Vec<_>, Vec<_>) = ring().partition(is_low);
-        let middle = |places: &[&Point3<f64>]| {
-            let sum: Vector3<f64> = places.iter().map(|place| Vector3::new(place.x, place.y, 0.0)).sum();
-            sum / places.len().max(1) as f64
-        };
+        let middle = |places: &[&Point3<f64>]| mean(places.iter().map(|place| Vector3::new(place.x, place.y, 0.0)));
         let over = (middle(&low) - middle(&high)).try_normalize(0.0).unwrap_or_else(Vector3::x);
         // nearer to the edge the ball may hang on it
         let far = |p: &Point3<f64>| p.coords.dot(&over);
@@ -145,13 +141,6 @@ impl EdgePattern {
         context.above_ground("edge", self.ground_z, OFF_GROUND)
     }
 
-    /// Inward from beyond the edge, at a place along it.
-    fn inward(&self, context: &SearchContext, along: f64, depth: f64) -> TouchPlan {
-        let beyond = Self::ring(&context.params) + context.params.ball_radius;
-        let from = Point3::origin() + self.over * beyond + self.along() * along;
-        context.sideways(&from, depth, &-self.over, 2.0 * beyond)
-    }
-
     /// The side through its contacts: with its z out of the material, x along the edge.
     fn side_plane(&self, context: &SearchContext) -> Plane {
         let points: Vec<_> = self.side.observations.iter().map(|o| context.in_f(&o.point)).collect();
@@ -179,15 +168,8 @@ impl EdgePattern {
 
     /// What is wanted of the top, whose y runs along the edge, or of the side, whose x does.
     fn wanted(params: &PatternParams, lean: Freedom) -> Wanted {
-        let asked = Asked::default();
-        let asked = match params.quantity {
-            Quantity::Axis => asked.each(&[lean], params.sigma),
-            Quantity::Position => asked.each(&[Freedom::Z], params.sigma),
-            // as far as it was touched
-            _ => asked.each(&[Freedom::Z], params.sigma).each(&[lean], params.sigma / (REACH * params.flag_radius)),
-        };
-        let before = Knowledge::before::<Plane>(params.flag_radius, LEAN);
-        Wanted { before, asked, fit: FitParams::default(), least: 0 }
+        // as far as it was touched
+        Wanted::of_plane(params, &[lean], REACH * params.flag_radius, LEAN, 0)
     }
 
     fn places(params: &PatternParams) -> impl Iterator<Item = f64> + '_ {
@@ -217,12 +199,10 @@ impl EdgePattern {
 
     /// Of the top or of the side, whichever gains more.
     fn next_of_both(&mut self, context: &SearchContext, deep: f64) -> Option<TouchPlan> {
-        let params = &context.params;
         let (top, side) = (self.top_plane(context), self.side_plane(context));
-        let of_top = Self::wanted(params, Freedom::TiltY);
-        let of_top = self.top.best(&top, &of_top, self.possible_top(context, &top), params);
-        let of_side = Self::wanted(params, Freedom::TiltX);
-        let of_side = self.side.best(&side, &of_side, self.possible_side(context, &side, deep), params);
+        let [of_top, of_side] = [Freedom::TiltY, Freedom::TiltX].map(|lean| Self::wanted(&context.params, lean));
+        let of_top = self.top.best(&top, &of_top, self.possible_top(context, &top));
+        let of_side = self.side.best(&side, &of_side, self.possible_side(context, &side, deep));
         let gain = |best: &Option<(Possible, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
         self.is_top_next = gain(&of_top) >= gain(&of_side);
         let (chosen, measuring) = if self.is_top_next { (of_top, &mut self.top) } else { (of_side, &mut self.side) };
@@ -242,19 +222,16 @@ impl Stage for EdgePattern {
                 context.down(&(Point3::origin() - self.over * back + self.along() * along), from_above)
             }
             EdgePhase::Side if self.tried >= MOST_FIRST => {
-                let walls = self.side.observations.len();
-                let reach_mm = 2e3 * (ring + ball);
+                let (walls, reach_mm) = (self.side.observations.len(), 2e3 * (ring + ball));
                 return Err(ExploreError::NoWall { kind: "edge", walls, asked: self.tried, reach_mm });
             }
             EdgePhase::Side => {
-                let along = [0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius;
-                let [_, deep] = self.depths(context)?;
-                self.inward(context, along, deep)
+                // inward from beyond the edge
+                let (along, beyond) = ([0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius, ring + ball);
+                let from = Point3::origin() + self.over * beyond + self.along() * along;
+                context.sideways(&from, self.depths(context)?[1], &-self.over, 2.0 * beyond)
             }
-            EdgePhase::Both => {
-                let [_, deep] = self.depths(context)?;
-                return Ok(self.next_of_both(context, deep));
-            }
+            EdgePhase::Both => return Ok(self.next_of_both(context, self.depths(context)?[1])),
         }))
     }
 
@@ -301,7 +278,7 @@ impl Stage for EdgePattern {
             return None;
         }
         let known = |measuring: &Measuring, plane: &Plane, lean: Freedom| {
-            measuring.uncertainty(plane, &Self::wanted(&context.params, lean), &context.params)
+            measuring.uncertainty(plane, &Self::wanted(&context.params, lean))
         };
         let of_top = known(&self.top, &self.top_plane(context), Freedom::TiltY)?;
         Some(of_top.max(known(&self.side, &self.side_plane(context), Freedom::TiltX)?))
@@ -318,15 +295,8 @@ impl Stage for EdgePattern {
         let to_f = context.pose_of.inverse() * self.side_plane(context).pose_of;
         let reach = REACH * flag_radius;
         let at = |share: f64| (to_f * Point3::new(reach * (2.0 * share - 1.0), 0.0, 0.0), to_f.rotation * Vector3::z());
-        let rim = RimStation {
-            at: &at,
-            length: 2.0 * reach,
-            is_closed: false,
-            back: BACK * ball_radius,
-            depths,
-            room: clearance,
-        };
-        rim.slides(context)
+        let (length, back) = (2.0 * reach, BACK * ball_radius);
+        RimStation { at: &at, length, is_closed: false, back, depths, room: clearance }.slides(context)
     }
 }
 

@@ -47,10 +47,8 @@ impl Explorer {
         params: PatternParams,
     ) -> Result<Self, ExploreError> {
         if !params.quantity.is_of(kind) {
-            return Err(ExploreError::NoSuchNumber {
-                kind: kind.map_or("unknown region", Kind::name),
-                number: params.quantity.name(),
-            });
+            let kind = kind.map_or("unknown region", Kind::name);
+            return Err(ExploreError::NoSuchNumber { kind, number: params.quantity.name() });
         }
         let stage: Box<dyn Stage> = match kind {
             Some(Kind::Hole) => Box::new(hole::HolePattern::new(&params)),
@@ -62,12 +60,8 @@ impl Explorer {
             None => Box::new(region::RegionPattern::new(&params)),
         };
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
-        Ok(Self {
-            context: SearchContext { params, pose_of, height: 0.0, touches: 0 },
-            stage,
-            asked: None,
-            ended: None,
-        })
+        let context = SearchContext { params, pose_of, height: 0.0, touches: 0 };
+        Ok(Self { context, stage, asked: None, ended: None })
     }
 
     /// Touches so far.
@@ -97,24 +91,19 @@ impl Explorer {
 
     /// Paths on which the ball slides over the whole feature; none where nothing was found, or where a ball has no room.
     pub fn slides(&self) -> Vec<Slide> {
-        match self.found() {
-            Ok(_) => self.stage.slides(&self.context),
-            Err(_) => Vec::new(),
-        }
+        if self.found().is_ok() { self.stage.slides(&self.context) } else { Vec::new() }
     }
 
     /// Takes the result of the planned touch.
     pub fn take(&mut self, result: &TouchResult) {
         let Some(planned) = self.asked.take() else { return };
         self.context.touches += 1;
-        let (place, observation) = match *result {
-            TouchResult::At { centre, sigma } => {
-                let offset = self.context.params.ball_radius;
-                let observation = Observation { point: centre, offset, sigma, group: self.context.touches as u32 };
-                (Some(self.context.in_f(&centre)), Some(observation))
-            }
-            TouchResult::Nothing | TouchResult::Unclear => (None, None),
+        let (offset, group) = (self.context.params.ball_radius, self.context.touches as u32);
+        let observation = match *result {
+            TouchResult::At { centre, sigma } => Some(Observation { point: centre, offset, sigma, group }),
+            TouchResult::Nothing | TouchResult::Unclear => None,
         };
+        let place = observation.map(|contact| self.context.in_f(&contact.point));
         self.stage.take(&mut self.context, &Touched { planned, result: *result, place, observation });
     }
 

@@ -4,8 +4,8 @@ use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
 use super::pattern::Touched;
-use super::search_context::{Expected, PatternParams, TouchPlan, TouchResult};
-use crate::features::fit::{FitParams, Observation, Surface, fit};
+use super::search_context::{Expected, PatternParams, Quantity, TouchPlan, TouchResult};
+use crate::features::fit::{FitParams, Freedom, Observation, Plane, Surface, fit};
 
 /// A candidate touch: where the surface would be touched, and how.
 pub(super) struct Possible {
@@ -23,19 +23,29 @@ pub(super) struct Wanted {
     pub fit: FitParams,
     /// so many touches before it is believed
     pub least: usize,
+    pub params: PatternParams,
 }
 
 impl Wanted {
+    /// What is wanted of a plane.
+    ///
+    /// - `leans`: those that count, as far as `reach` from its middle, m; `most`: what leans more is another surface, rad.
+    pub fn of_plane(params: &PatternParams, leans: &[Freedom], reach: f64, most: f64, least: usize) -> Self {
+        let (asked, sigma) = (Asked::default(), params.sigma);
+        let asked = match params.quantity {
+            Quantity::Axis => asked.each(leans, sigma),
+            Quantity::Position => asked.each(&[Freedom::Z], sigma),
+            _ => asked.each(&[Freedom::Z], sigma).each(leans, sigma / reach),
+        };
+        let (before, fit) = (Knowledge::before::<Plane>(params.flag_radius, most), FitParams::default());
+        Self { before, asked, fit, least, params: *params }
+    }
+
     /// The covariance of a surface after touches of it.
-    fn known<'a, M: Surface>(
-        &self,
-        surface: &M,
-        touches: impl Iterator<Item = &'a Observation>,
-        params: &PatternParams,
-    ) -> Knowledge {
+    fn known<'a, M: Surface>(&self, surface: &M, touches: impl Iterator<Item = &'a Observation>) -> Knowledge {
         touches.fold(self.before.clone(), |known, o| {
             // the ball's centre lies on the same normal as the place that it touches
-            known.with(surface, &Candidate { point: o.point, sigma: o.sigma.max(params.touch_sigma) })
+            known.with(surface, &Candidate { point: o.point, sigma: o.sigma.max(self.params.touch_sigma) })
         })
     }
 }
@@ -76,7 +86,7 @@ impl Measuring {
     /// of those that lie on one surface, and stretched where they differ from it beyond what they say of themselves.
     ///
     /// `None` where there are too few, where they do not fix a number, or where more than [`MOST_REFUSED`] of them lie elsewhere.
-    pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted, params: &PatternParams) -> Option<f64> {
+    pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted) -> Option<f64> {
         if self.observations.len() < wanted.least {
             return None;
         }
@@ -86,40 +96,25 @@ impl Measuring {
             return None;
         }
         let kept = self.observations.iter().zip(&fit.used).filter(|(_, used)| **used).map(|(o, _)| o);
-        let share = wanted.known(guess, kept, params).worst(&wanted.asked);
-        Some(share * (fit.chi_squared / fit.degrees.max(1) as f64).sqrt().max(1.0) * params.sigma)
+        let share = wanted.known(guess, kept).worst(&wanted.asked);
+        Some(share * (fit.chi_squared / fit.degrees.max(1) as f64).sqrt().max(1.0) * wanted.params.sigma)
     }
 
     /// The touch with the largest gain for the requested numbers, and its gain.
-    pub fn best<M: Surface>(
-        &self,
-        surface: &M,
-        wanted: &Wanted,
-        possible: impl IntoIterator<Item = Possible>,
-        params: &PatternParams,
-    ) -> Option<(Possible, f64)> {
-        let known = wanted.known(surface, self.observations.iter(), params);
+    pub fn best<M: Surface>(&self, surface: &M, wanted: &Wanted, possible: Vec<Possible>) -> Option<(Possible, f64)> {
+        let known = wanted.known(surface, self.observations.iter());
         let is_alive = |p: &Possible| self.dead.iter().all(|dead| (dead - p.point).norm() > DEAD);
-        let mut possible: Vec<Possible> = possible.into_iter().filter(is_alive).collect();
-        let candidate = |p: &Possible| Candidate { point: p.point, sigma: params.touch_sigma };
-        let candidates: Vec<_> = possible.iter().map(candidate).collect();
-        let best = known.best(surface, &candidates, &wanted.asked)?;
-        let gain = known.gain(surface, &candidates[best], &wanted.asked);
-        let mut chosen = possible.swap_remove(best);
+        let candidate = |p: &Possible| Candidate { point: p.point, sigma: wanted.params.touch_sigma };
+        let possible = possible.into_iter().filter(is_alive);
+        let (mut chosen, gain) = known.best(surface, possible, candidate, &wanted.asked)?;
         let sigma = known.sigma_at(surface, &chosen.point);
         chosen.planned.expected = Some(Expected { travel: chosen.travel, sigma });
         Some((chosen, gain))
     }
 
     /// The planned touch with the largest gain.
-    pub fn next<M: Surface>(
-        &mut self,
-        surface: &M,
-        wanted: &Wanted,
-        possible: impl IntoIterator<Item = Possible>,
-        params: &PatternParams,
-    ) -> Option<TouchPlan> {
-        self.best(surface, wanted, possible, params).map(|(best, _)| self.aim(&best))
+    pub fn next<M: Surface>(&mut self, surface: &M, wanted: &Wanted, possible: Vec<Possible>) -> Option<TouchPlan> {
+        self.best(surface, wanted, possible).map(|(best, _)| self.aim(&best))
     }
 
     /// The planned touch is one of this surface.

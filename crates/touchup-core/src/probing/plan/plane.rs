@@ -3,16 +3,15 @@
 use nalgebra::Point3;
 
 use super::cylinder_fit::surface_about;
-use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::{Stage, Touched};
 use super::search::{ROUGH, hexagonal};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
+use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::Slide;
 use crate::features::Feature;
-use crate::features::fit::{FitParams, Freedom, Plane};
+use crate::features::fit::{Freedom, Plane};
 
 /// Places across the field that are candidates.
 const ACROSS: f64 = 6.0;
@@ -43,16 +42,8 @@ impl PlanePattern {
     }
 
     fn wanted(params: &PatternParams) -> Wanted {
-        let asked = Asked::default();
-        let leans = [Freedom::TiltX, Freedom::TiltY];
-        let asked = match params.quantity {
-            Quantity::Axis => asked.each(&leans, params.sigma),
-            Quantity::Position => asked.each(&[Freedom::Z], params.sigma),
-            // at the rim of the field it is to be known as well as in its middle
-            _ => asked.each(&[Freedom::Z], params.sigma).each(&leans, params.sigma / params.flag_radius),
-        };
-        let before = Knowledge::before::<Plane>(params.flag_radius, LEAN);
-        Wanted { before, asked, fit: FitParams::default(), least: LEAST }
+        // at the rim of the field it is to be known as well as in its middle
+        Wanted::of_plane(params, &[Freedom::TiltX, Freedom::TiltY], params.flag_radius, LEAN, LEAST)
     }
 
     fn possible(&self, context: &SearchContext) -> Vec<Possible> {
@@ -77,8 +68,7 @@ impl Stage for PlanePattern {
             let farthest = possible.into_iter().max_by(|a, b| far(a).total_cmp(&far(b)));
             return Ok(farthest.map(|farthest| self.measuring.aim(&farthest)));
         }
-        let (guess, params) = (Self::guess(context), &context.params);
-        Ok(self.measuring.next(&guess, &Self::wanted(params), possible, params))
+        Ok(self.measuring.next(&Self::guess(context), &Self::wanted(&context.params), possible))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
@@ -104,14 +94,13 @@ impl Stage for PlanePattern {
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
-        self.measuring.uncertainty(&Self::guess(context), &Self::wanted(&context.params), &context.params)
+        self.measuring.uncertainty(&Self::guess(context), &Self::wanted(&context.params))
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Ok(fitted) = surface_about(context, &Point3::origin(), &self.measuring.observations) else {
-            return Vec::new();
-        };
-        let level = SearchContext { pose_of: fitted.surface.pose_of, height: 0.0, ..context.clone() };
-        vec![level.raster(context.params.flag_radius)]
+        let fitted = surface_about(context, &Point3::origin(), &self.measuring.observations).ok();
+        let level = |pose_of| SearchContext { pose_of, height: 0.0, ..context.clone() };
+        let slide = fitted.map(|fitted| level(fitted.surface.pose_of).raster(context.params.flag_radius));
+        slide.into_iter().collect()
     }
 }

@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::search_context::{SearchContext, toward};
+use super::search_context::SearchContext;
 
 /// A station of a slide: of a planned one in O, of one that is made in B.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,15 +105,12 @@ impl RimStation<'_> {
         }
         let on_wall = |depth: f64| FRAC_PI_2 * ball + depth;
         let levels = (((deepest - highest) / (LINES * ball)).ceil() as usize + 1).min(MOST_LEVELS);
-        let mut slides: Vec<Slide> = (0..levels)
-            .map(|level| {
-                let depth = highest + (deepest - highest) * level as f64 / (levels - 1).max(1) as f64;
-                let around = steps(self.length, ball).map(|share| self.station(context, share, on_wall(depth)));
-                self.slide(context, around.collect())
-            })
-            .collect();
-        slides.push(self.zigzag(context, on_wall(highest)));
-        slides
+        let along_wall = |level: usize| {
+            let depth = highest + (deepest - highest) * level as f64 / (levels - 1).max(1) as f64;
+            let around = steps(self.length, ball).map(|share| self.station(context, share, on_wall(depth)));
+            self.slide(context, around.collect())
+        };
+        (0..levels).map(along_wall).chain([self.zigzag(context, on_wall(highest))]).collect()
     }
 
     /// Down over the rim, on along the wall, up over the rim, on along the surface above, and again.
@@ -144,16 +141,6 @@ impl RimStation<'_> {
 fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
     let count = (length / (CLOSE * ball)).ceil().max(1.0);
     (0..=count as usize).map(move |step| step as f64 / count)
-}
-
-/// Around a round wall, in F.
-///
-/// - `side`: −1: the open is inside, as in a hole; 1: outside, as around a boss.
-pub(super) fn circle(middle: Point3<f64>, radius: f64, side: f64) -> impl Fn(f64) -> (Point3<f64>, Vector3<f64>) {
-    move |share| {
-        let direction = toward(share);
-        (middle + direction * radius, direction * side)
-    }
 }
 
 /// Length of the rim of a slot, m, and the rim in the frame of the slot: x along it, the origin in its middle.
@@ -188,14 +175,13 @@ impl SearchContext {
     pub(super) fn raster(&self, radius: f64) -> Slide {
         let ball = self.params.ball_radius;
         let count = (2.0 * radius / (LINES * ball)).ceil().max(1.0);
-        let mut places: Vec<Point3<f64>> = Vec::new();
-        for line in 0..count as usize {
+        let line = |line: usize| {
             let across = radius * ((2 * line + 1) as f64 / count - 1.0);
             let half = (radius * radius - across * across).sqrt();
-            let sign = if line % 2 == 0 { 1.0 } else { -1.0 };
-            places.extend([-half, half].map(|along| Point3::new(sign * along, across, self.height)));
-        }
-        self.along(&places)
+            let sign = if line.is_multiple_of(2) { 1.0 } else { -1.0 };
+            [-half, half].map(|along| Point3::new(sign * along, across, self.height))
+        };
+        self.along(&(0..count as usize).flat_map(line).collect::<Vec<_>>())
     }
 
     /// Over places of the surface, in F, from one to the next.

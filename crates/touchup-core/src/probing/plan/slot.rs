@@ -85,14 +85,13 @@ impl SlotPattern {
     fn renew(&mut self, context: &SearchContext) {
         let flat: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point).xy()).collect();
         let free: Vec<_> = self.free.iter().map(|place| context.in_f(place).xy()).collect();
-        let slot_fit = match &self.slot_fit {
+        self.slot_fit = match self.slot_fit {
             Some(known) if self.phase == SlotPhase::Wall => Some(known.fitted(&flat)),
             // the first guess of its length may be far off
             known => SlotFit::through(&flat, &free, &self.middle.xy())
                 .map(|slot_fit| known.map_or(slot_fit, |known| slot_fit.along_as(&known))),
         };
-        self.slot_fit = slot_fit;
-        self.walls = slot_fit.map(|slot_fit| {
+        self.walls = self.slot_fit.map(|slot_fit| {
             let centre = context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
             let along = context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
             let width = 2.0 * (slot_fit.radius + context.params.ball_radius);
@@ -119,6 +118,7 @@ impl SlotPattern {
             asked: asked.and_the_rest::<Stadium>(sigma, walls.width / 2.0),
             fit: square(),
             least: LEAST_WALL,
+            params: *params,
         }
     }
 
@@ -127,10 +127,9 @@ impl SlotPattern {
     fn open_part(&self, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let half = (walls.length - walls.width).max(0.0) / 2.0;
         let fitted = fit(walls, &self.measuring.observations, &square()).ok();
-        let is_kept = |at: usize| fitted.as_ref().is_some_and(|fitted| fitted.used[at]);
-        let kept = (0..self.measuring.observations.len()).filter(|at| is_kept(*at));
-        let kept: Vec<_> =
-            kept.map(|at| walls.pose_of.inverse_transform_point(&self.measuring.observations[at].point)).collect();
+        let used = fitted.iter().flat_map(|fitted| &fitted.used);
+        let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
+        let kept: Vec<_> = kept.map(|(o, _)| walls.pose_of.inverse_transform_point(&o.point)).collect();
         let is_touched = |sign: f64, [low, high]: [f64; 2]| {
             let angle = |q: &Point3<f64>| q.y.atan2(sign * q.x - half);
             kept.iter().any(|q| sign * q.x > half && (low..=high).contains(&angle(q)))
@@ -172,10 +171,6 @@ impl SlotPattern {
         places.flat_map(|place| depths.map(|depth| planned(place, depth))).collect()
     }
 
-    fn not_done(&self, context: &SearchContext) -> ExploreError {
-        OpeningSearch::not_done(context, self.phase == SlotPhase::Opening)
-    }
-
     fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
         if self.measuring.observations.is_empty() && touch.result == TouchResult::Unclear {
             self.opening.slid_in(self.middle, context);
@@ -214,12 +209,6 @@ impl SlotPattern {
             self.renew(context);
             self.phase = SlotPhase::End(1.0, 0.0);
         }
-    }
-
-    /// Start of the search for an end, on the middle line of the slot.
-    fn end_from(&self, context: &SearchContext, walls: &Stadium, sign: f64, beyond: f64) -> Point3<f64> {
-        let at = walls.pose_of.inverse_transform_point(&(context.pose_of * self.middle)).x;
-        context.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)))
     }
 
     fn take_end(&mut self, context: &SearchContext, touch: &Touched, sign: f64, beyond: f64) {
@@ -287,19 +276,17 @@ impl Stage for SlotPattern {
             }
             SlotPhase::End(..) if self.tried >= SEARCHES => return Err(ExploreError::NoEnd { searches: self.tried }),
             SlotPhase::End(sign, beyond) => {
-                let from = self.end_from(context, &walls, sign, beyond);
+                // from the middle line of the slot
+                let at = walls.pose_of.inverse_transform_point(&(context.pose_of * self.middle)).x;
+                let from = context.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)));
                 context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball)
             }
             SlotPhase::Floor => context.sideways(&centre, shallow, &-Vector3::z(), REACH),
             // those before have returned
             SlotPhase::Wall | SlotPhase::Opening | SlotPhase::First => {
                 let possible = self.possible(context, &walls, self.open_part(&walls));
-                return Ok(self.measuring.next(
-                    &walls,
-                    &Self::wanted(&context.params, &walls),
-                    possible,
-                    &context.params,
-                ));
+                let wanted = Self::wanted(&context.params, &walls);
+                return Ok(self.measuring.next(&walls, &wanted, possible));
             }
         }))
     }
@@ -325,12 +312,12 @@ impl Stage for SlotPattern {
     }
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
-        let walls =
-            self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(|| self.not_done(context))?;
+        let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
+        let walls = self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
         let fitted = fit(walls, &self.measuring.observations, &square())?;
         // where an end was not touched it has no length, and no middle
-        fitted.std(Freedom::Second).ok_or_else(|| self.not_done(context))?;
+        fitted.std(Freedom::Second).ok_or_else(not_done)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
         Ok(Some(Feature::slot(&fitted, &top, self.floor.as_ref(), touches)))
     }
@@ -338,7 +325,7 @@ impl Stage for SlotPattern {
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let walls = self.walls.as_ref().filter(|_| self.phase == SlotPhase::Wall)?;
         let is_determined = self.open_part(walls).is_none() && self.is_consistent(context, walls);
-        let known = || self.measuring.uncertainty(walls, &Self::wanted(&context.params, walls), &context.params);
+        let known = || self.measuring.uncertainty(walls, &Self::wanted(&context.params, walls));
         is_determined.then(known).flatten()
     }
 
@@ -352,14 +339,7 @@ impl Stage for SlotPattern {
             let place = to_f * place;
             (Point3::new(place.x, place.y, context.height), to_f.rotation * over)
         };
-        let rim = RimStation {
-            at: &at,
-            length,
-            is_closed: true,
-            back: BESIDE * ball,
-            depths: [BELOW_RIM * ball, self.depth],
-            room: walls.width / 2.0 - ball,
-        };
-        rim.slides(context)
+        let (depths, room) = ([BELOW_RIM * ball, self.depth], walls.width / 2.0 - ball);
+        RimStation { at: &at, length, is_closed: true, back: BESIDE * ball, depths, room }.slides(context)
     }
 }
