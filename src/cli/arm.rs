@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use super::CliError;
 use super::probing::{Ready, millimetres};
 use super::progress::WorkProgress;
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Prober};
@@ -39,12 +39,12 @@ const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in th
 /// The UR of a scene.
 ///
 /// # Errors
-/// [`CliError::Usage`] where the scene names none, or touchup was built without it; [`CliError::Arm`] where it does not answer.
+/// [`CliError::usage`] where the scene names none, or touchup was built without it; [`CliError::arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
     let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
-    let (robot, (cell, _)) = robot.ok_or_else(|| CliError::Usage(NO_HOST.to_owned()))?;
+    let (robot, (cell, _)) = robot.ok_or_else(|| CliError::usage(NO_HOST))?;
     let params = UrParams {
         pose_ft: cell.pose_ft,
         mass: robot.payload_mass,
@@ -57,7 +57,7 @@ pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError>
 
 #[cfg(not(feature = "ur"))]
 pub(super) fn connect_ur(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    Err(CliError::Usage(NO_UR.to_owned()))
+    Err(CliError::usage(NO_UR))
 }
 
 #[cfg(not(feature = "ur"))]
@@ -123,7 +123,7 @@ impl CellArguments {
             Some(scan) => Ok((scan.clone(), self.mesh_unit)),
             None => Scene::read(scene)?
                 .scan_file(scene)
-                .ok_or_else(|| CliError::Usage("there is no scan: name it by --scan, or in the scene".to_owned())),
+                .ok_or_else(|| CliError::usage("there is no scan: name it by --scan, or in the scene")),
         }
     }
 
@@ -173,10 +173,8 @@ impl CellArguments {
     }
 
     fn part(&self) -> Result<TriMesh, CliError> {
-        let Some(truth) = &self.truth else {
-            return Err(CliError::Usage("--robot sim needs the part that it touches: --truth MESH".to_owned()));
-        };
-        let MeshFile { mesh, .. } = read_mesh(truth, self.mesh_unit).map_err(CliError::ReadTruth)?;
-        Ok(mesh)
+        let missing = || CliError::usage("--robot sim needs the part that it touches: --truth MESH");
+        let truth = self.truth.as_ref().ok_or_else(missing)?;
+        Ok(read_mesh(truth, self.mesh_unit).map_err(CliError::truth)?.mesh)
     }
 }

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::Point3;
-use serde::Serialize;
 
 use super::arm::ArmArguments;
 use super::probing::millimetres;
-use super::{CliError, Losses, print_report, reported};
+use super::{CliError, Losses, print_report, reported, require, require_positive};
 use crate::probing::execute::{Repeatability, SpotTouch};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
@@ -38,9 +37,7 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
     let CheckArguments { arm, scene, spot, touches, gate_um, json } = arguments;
-    if !(*gate_um > 0.0 && gate_um.is_finite()) {
-        return Err(CliError::Usage(format!("--gate-um {gate_um} must be above 0")));
-    }
+    require_positive("--gate-um", *gate_um)?;
     let found = repeated(arm, scene, spot, *touches)?;
     let checked = Checked::of(&found, *gate_um);
     print_report(*json, &checked, || checked.to_string());
@@ -61,10 +58,8 @@ pub(super) fn repeated(
     touches: usize,
 ) -> Result<Repeatability, CliError> {
     let place = Point3::from(millimetres("--spot", spot)?);
-    if !TOUCHES.contains(&touches) {
-        let (least, most) = (TOUCHES.start(), TOUCHES.end());
-        return Err(CliError::Usage(format!("--touches {touches} must be {least} to {most}")));
-    }
+    let (least, most) = (TOUCHES.start(), TOUCHES.end());
+    require(TOUCHES.contains(&touches), format!("--touches {touches} must be {least} to {most}"))?;
     let ArmArguments { robot, cell } = arm;
     let found = cell.measure(*robot, scene, "touch", |arm, _| Ok(arm), |prober| prober.repeat(&place, touches))?;
     Ok(found.0)
@@ -72,7 +67,6 @@ pub(super) fn repeated(
 
 reported! {
     /// What `--json` prints.
-    #[derive(Debug, Serialize)]
     struct Checked, fn of(found: &Repeatability, gate: f64) {
         spot_mm: [f64; 3] = (found.place * 1e3).coords.into(),
         normal: [f64; 3] = found.normal.into_inner().into(),
@@ -89,7 +83,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct CheckedTouch, fn of(found: (&SpotTouch, f64)) {
         side: i8 = found.0.side,
         /// outward from the mean of all

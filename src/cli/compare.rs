@@ -10,10 +10,10 @@ use nalgebra::{Isometry3, Point3};
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
-use self::table::{CompareReport, ComparisonReport, ShapeReport, diagonal};
+use self::table::{CompareReport, diagonal};
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, check_outputs, print_report};
+use super::{CliError, Losses, Threads, check_outputs, print_report, require};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
     colour_of, compare as compare_shapes,
@@ -132,11 +132,10 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     arguments.check_alignment()?;
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
-    let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
-    let MeshFile { mesh: truth, .. } =
-        read_mesh(&arguments.truth, arguments.truth_unit).map_err(CliError::ReadTruth)?;
+    let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
+    let MeshFile { mesh: truth, .. } = read_mesh(&arguments.truth, arguments.truth_unit).map_err(CliError::truth)?;
     let before = arguments.before.as_ref().map(|path| read_mesh(path, arguments.mesh_unit)).transpose();
-    let before = before.map_err(CliError::ReadMesh)?.map(|file| file.mesh);
+    let before = before?.map(|file| file.mesh);
     let regions = read_regions(&arguments.mesh, arguments.mesh_unit, &as_read)?;
     if let Some(hint) = unit_hint([&as_read, &truth], [arguments.mesh_unit, arguments.truth_unit]) {
         warn!("{hint}");
@@ -144,16 +143,14 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let truth = PlacedMesh::new(truth);
     drop(reading);
 
-    let with_report = |(pose, alignment)| (pose, Some(alignment));
     let (pose, alignment) = match arguments.align {
         Align::None => (Isometry3::identity(), None),
-        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed).map(with_report)?,
+        Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed)?,
         Align::Features => {
             let alternative = arguments.alternative.map(usize::from);
-            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json)
-                .map(with_report)?
+            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json)?
         }
-        Align::Pairs => aligned_by_pairs(arguments.pairs()?).map(with_report)?,
+        Align::Pairs => aligned_by_pairs(arguments.pairs()?)?,
     };
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
@@ -162,8 +159,8 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         let labels = arguments.feature_labels(&pose)?;
         let caption =
             format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
-        let drawing = Annotations { caption, labels, regions: regions.as_deref() };
-        arguments.draw(path, (&mesh, &refined), before.as_ref().zip(scanned.as_ref()), &drawing)?;
+        let before = before.as_ref().zip(scanned.as_ref());
+        arguments.draw(path, (&mesh, &refined), before, &caption, &labels, regions.as_deref())?;
     }
     if let Some(path) = &arguments.coloured {
         let colours: Vec<_> = refined.vertex_deviations.iter().map(|&d| colour_of(d, refined.range)).collect();
@@ -171,21 +168,8 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         let column = VertexColumn { name: "deviation_mm", values: in_mm.into() };
         write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
     }
-    Ok(CompareReport {
-        mesh: ShapeReport::of(&arguments.mesh, &as_read),
-        truth: ShapeReport::of(&arguments.truth, &truth.mesh),
-        alignment,
-        before: scanned.as_ref().map(ComparisonReport::of),
-        after: ComparisonReport::of(&refined),
-    })
-}
-
-/// Labels of a picture beside the deviations.
-struct Annotations<'a> {
-    caption: String,
-    labels: Vec<PictureLabel>,
-    /// of each vertex slot of the mesh
-    regions: Option<&'a [SupportRegion]>,
+    let shapes = [(&*arguments.mesh, &as_read), (&*arguments.truth, &truth.mesh)];
+    Ok(CompareReport::of(shapes, alignment, scanned.as_ref(), &refined))
 }
 
 impl CompareArguments {
@@ -221,12 +205,16 @@ impl CompareArguments {
     }
 
     /// Draws the deviations.
+    ///
+    /// - `regions`: of each vertex slot of the mesh.
     fn draw(
         &self,
         path: &Path,
         (mesh, refined): (&PlacedMesh, &Comparison),
         before: Option<(&PlacedMesh, &Comparison)>,
-        drawing: &Annotations<'_>,
+        caption: &str,
+        labels: &[PictureLabel],
+        regions: Option<&[SupportRegion]>,
     ) -> Result<(), CliError> {
         let _drawing = WorkProgress::stage("draw");
         let title = format!("{} against {}", file_name(&self.mesh), file_name(&self.truth));
@@ -247,17 +235,17 @@ impl CompareArguments {
             })
             .collect();
         let is_touched = |region: &SupportRegion| *region == SupportRegion::Touched;
-        let weights = drawing.regions.filter(|regions| regions.iter().any(is_touched)).map(|regions| {
+        let weights = regions.filter(|regions| regions.iter().any(is_touched)).map(|regions| {
             regions.iter().map(|region| if is_touched(region) { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
         });
         let params = PictureParams {
             title: &title,
-            caption: &drawing.caption,
+            caption,
             range: refined.range,
             tolerance: self.tolerance_mm.map(|tolerance| tolerance * 1e-3),
             from: view_from(self.view.as_ref())?,
             weights: weights.as_deref(),
-            labels: &drawing.labels,
+            labels,
             ..PictureParams::default()
         };
         write_picture(path, &panels, &params)
@@ -278,8 +266,7 @@ impl CompareArguments {
     }
 
     fn pairs(&self) -> Result<&Path, CliError> {
-        let missing =
-            || CliError::Usage("--align pairs needs a file: compare MESH TRUTH --align pairs FILE".to_owned());
+        let missing = || CliError::usage("--align pairs needs a file: compare MESH TRUTH --align pairs FILE");
         self.pairs.as_deref().ok_or_else(missing)
     }
 
@@ -287,13 +274,10 @@ impl CompareArguments {
         if self.align == Align::Pairs {
             self.pairs()?;
         } else if let Some(path) = &self.pairs {
-            let path = path.display();
-            return Err(CliError::Usage(format!("{path} is one file too many without --align pairs")));
+            return Err(CliError::usage(format!("{} is one file too many without --align pairs", path.display())));
         }
-        if self.alternative.is_some() && self.align != Align::Features {
-            return Err(CliError::Usage("--alternative chooses among what --align features finds".to_owned()));
-        }
-        Ok(())
+        let is_allowed = self.alternative.is_none() || self.align == Align::Features;
+        require(is_allowed, "--alternative chooses among what --align features finds")
     }
 
     /// Checks that the result can be written before the work begins.
@@ -315,7 +299,7 @@ fn positive(text: &str) -> Result<f64, String> {
 
 /// Support of each vertex of a refined PLY; `None` for a mesh without it.
 fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<SupportRegion>>, CliError> {
-    let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"]).map_err(CliError::ReadMesh)?;
+    let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"])?;
     let of_support = |support: &f32| match *support {
         0.0 => SupportRegion::Untouched,
         1.0 => SupportRegion::Touched,

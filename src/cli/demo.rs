@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Point3;
 use serde::Serialize;
 
 use super::arm::RobotName;
@@ -13,14 +14,14 @@ use super::demo_robot::demo_robot;
 use super::found::FoundTable;
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
-use super::simulate::{Simulated, TouchModel, write_simulation};
-use super::touched::{RegionError, TouchedTruth};
+use super::simulate::{Simulated, write_simulation};
 use super::{CliError, Losses, print_result, reported, write_json};
+use crate::compare::TouchedRegion;
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::recording::Topics;
-use crate::mesh::MeshError;
-use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, measure_quality, plan_demo};
+use crate::mesh::{FaceTree, MeshError, TriMesh};
+use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality, plan_demo};
 
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
@@ -55,7 +56,6 @@ struct DemoSummary {
 
 reported! {
     /// The scan as a whole against the part.
-    #[derive(Debug, Serialize)]
     struct ScanErrors, fn of(quality: &ScanQuality) {
         faces: usize = quality.faces,
         edge_median_mm: f64 = quality.edge_median * 1e3,
@@ -70,32 +70,34 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     match arguments.robot {
         None => {}
         Some(RobotName::Sim) => return demo_robot(&arguments.out, arguments.seed),
-        Some(RobotName::Ur) => return Err(CliError::Usage("the demo has a simulated arm: --robot sim".to_owned())),
+        Some(RobotName::Ur) => return Err(CliError::usage("the demo has a simulated arm: --robot sim")),
     }
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default())?;
     let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
     let truth = plate.mesh(CHORD_ERROR)?;
-    let model = TouchModel { stylus: StylusParams::default(), camera: None, seed: arguments.seed };
-    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &model, &arguments.out)?;
+    let stylus = StylusParams::default();
+    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &stylus, None, &arguments.out)?;
 
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
     let files = RefineArguments::in_folder(out.join("scan.ply"), unit, out, None, Topics::default());
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
-    let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit)?;
 
     let named = read_features(&out.join("features.json"))?.features;
     let found = FoundTable::of(&plate.features(), &named);
     compared(&CompareArguments::in_folder(out, named))?;
 
     let _measuring = WorkProgress::stage("measure");
-    let touched = TouchedTruth::of(&touch.moments);
+    // the true contacts of the ball with the part
+    let contacts = touch.moments.iter().flat_map(|moment| &moment.contacts);
+    let touched = TouchedRegion::of(contacts.map(|contact| contact.point));
     let demo = DemoSummary {
         scan: ScanErrors::of(&measure_quality(&scan, &plate, |_| true).ok_or(MeshError::Empty)?),
         touched_s: touch.moments.last().map_or(0.0, |moment| moment.t),
-        before: touched.error(&plate, &scan),
-        after: touched.error(&plate, &refined),
+        before: RegionError::of(&touched, &plate, &scan),
+        after: RegionError::of(&touched, &plate, &refined),
         refine: summary,
         found,
     };
@@ -122,4 +124,26 @@ impl fmt::Display for DemoSummary {
         writeln!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)?;
         write!(f, "\n{}\n", self.found)
     }
+}
+
+reported! {
+    /// Distances between part and mesh in the touched region, mean and 95th percentile, mm.
+    #[derive(Clone, Copy)]
+    struct RegionError, fn of(touched: &TouchedRegion, part: &dyn Surface, mesh: &TriMesh) {
+        /// from the points that were touched to the mesh: what is missing
+        part_to_mesh_mm: [f64; 2] = part_to_mesh_mm(touched, mesh),
+        /// from the mesh to the part, where its closest point belongs to the region: what is wrong
+        mesh_to_part_mm: [f64; 2] = measure_quality(mesh, part, |p| touched.is_near(&part.closest(p).point))
+            .map_or([0.0; 2], |quality| [quality.mean * 1e3, quality.p95 * 1e3]),
+    }
+}
+
+fn part_to_mesh_mm(touched: &TouchedRegion, mesh: &TriMesh) -> [f64; 2] {
+    let tree = FaceTree::new(mesh);
+    let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).map(|hit| (hit.point - p).norm());
+    let mut distances: Vec<f64> = touched.contacts().iter().filter_map(to_mesh).collect();
+    distances.sort_by(f64::total_cmp);
+    let mean = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
+    let p95 = distances.get(distances.len() * 95 / 100).copied().unwrap_or_default();
+    [mean * 1e3, p95 * 1e3]
 }

@@ -38,7 +38,6 @@ struct RobotSummary {
 
 reported! {
     /// Errors of the probed features; `found` is what was measured of one, if anything was.
-    #[derive(Debug, Serialize)]
     struct ProbedError, fn of(flag: &Flag, truth: &TruthFeature, probed: Option<&Probed>, found: Option<&Feature>) {
         name: &'static str = truth.name,
         /// error of the click
@@ -64,7 +63,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let scanned = scan(&plate, &scanner)?;
     drop(scanning);
     for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
-        write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
+        write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
     }
     write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes())).map_err(not_written(&scene_path))?;
 
@@ -85,7 +84,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     probing.planned(&ready, &mut arm)?;
     let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
 
-    let named = probed.iter().filter_map(feature_of).map(FeatureRecord::from).collect();
+    let named = probed.iter().filter_map(feature_of).map(FeatureRecord::of).collect();
     compared(&CompareArguments::in_folder(out, named))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);

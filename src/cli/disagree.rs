@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
@@ -49,7 +48,6 @@ pub(super) struct DisagreeArguments {
 
 reported! {
     /// What `--json` prints.
-    #[derive(Debug, Serialize)]
     struct DisagreeReport, fn of(found: &Disagreement) {
         /// `null` where too little was touched to know how the scanner errs
         scanner: Option<ScannerReport> = found.scanner.as_ref().map(ScannerReport::of),
@@ -62,7 +60,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct ScannerReport, fn of(scanner: &Scanner) {
         /// touch − scan where the scanner sees well: negative where the part looks too large
         offset_mm: f64 = scanner.offset * 1e3,
@@ -75,7 +72,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct RigidOffsetReport, fn of(offset: &RigidOffset) {
         /// would bring the scan onto the touches, at `center_mm`
         shift_mm: [f64; 3] = (offset.shift * 1e3).into(),
@@ -90,7 +86,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct ClassReport, fn of(found: &Disagreement, at: usize, known: &Class) {
         class: &'static str = known.name(),
         /// as in the column `class`
@@ -101,7 +96,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct DisagreementRow, fn of(region: &DisagreementRegion) {
         class: &'static str = region.class.name(),
         center_mm: [f64; 3] = (region.centre.coords * 1e3).into(),
@@ -116,7 +110,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct BadTouchReport, fn of(bad: &BadTouches) {
         center_mm: [f64; 3] = (bad.centre.coords * 1e3).into(),
         touches: Vec<u32> = bad.touches.clone(),
@@ -133,8 +126,7 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     let reading = WorkProgress::stage("read");
     let unit = arguments.mesh_unit;
     let [scan, refined] = [&arguments.scan, &arguments.refined].map(|path| read_mesh(path, unit));
-    let scan = scan.map_err(CliError::ReadMesh)?.mesh;
-    let refined = refined.map_err(CliError::ReadMesh)?.mesh;
+    let (scan, refined) = (scan?.mesh, refined?.mesh);
     let known = read_known(&arguments.refined, unit, &refined)?;
     let touches = read_touches(&arguments.touches)?;
     drop(reading);
@@ -166,10 +158,10 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
 
 /// Support of each vertex.
 fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexBasis>, CliError> {
-    let [support] = read_vertex_columns(path, unit, mesh, ["support"]).map_err(CliError::ReadMesh)?;
-    let support = support.filter(|support| support.len() == mesh.vertex_slots()).ok_or_else(|| {
-        CliError::Usage(format!("{} does not say what was touched: give the PLY that refine wrote", path.display()))
-    })?;
+    let [support] = read_vertex_columns(path, unit, mesh, ["support"])?;
+    let why = format!("{} does not say what was touched: give the PLY that refine wrote", path.display());
+    let whole = support.filter(|support| support.len() == mesh.vertex_slots());
+    let support = whole.ok_or_else(|| CliError::usage(why))?;
     let known = |support: &f32| match *support {
         1.0 => VertexBasis::Touched,
         3.0 => VertexBasis::Unreachable,

@@ -1,14 +1,20 @@
-//! What a verb ends with: an error, or the losses of work that was done.
+//! What a verb ends with: the losses of work that was done, or an error: one line of text, or one JSON object where `--json` is asked for.
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::io::{self, ErrorKind, Write, stderr};
+use std::iter::successors;
+use std::path::Path;
+use std::process::ExitCode;
+
+use serde::Serialize;
 
 use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
-use crate::io::recording::RecordingError;
 use crate::io::touches_file::TouchesFileError;
+use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeError;
@@ -18,168 +24,189 @@ use crate::sim::SimError;
 /// Losses of work that was done; empty: none.
 pub(super) type Losses = Vec<String>;
 
-/// Error of a verb.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum CliError {
+/// Why a command ended with another exit code than 0, as `--json` prints it.
+#[derive(Debug, Serialize)]
+pub(super) struct CliError {
+    /// what is wrong: `usage`, `scene`, `mesh`, `recording`, `not_written`, `losses`, …
+    pub kind: &'static str,
+    /// in words, with values and units
+    pub message: String,
+    /// what to do next, where the message does not say it
+    pub hint: Option<&'static str>,
+    /// 1 to 4, as `touchup --help` lists them
+    pub exit_code: u8,
+}
+
+/// Kind and exit code of a result that is not there.
+const NOT_WRITTEN: (&str, u8) = ("not_written", 1);
+
+impl CliError {
+    /// - `cause`: where it is one of a room, in which a missing file may be the reason.
+    pub fn new(
+        (kind, exit_code): (&'static str, u8),
+        message: impl Display,
+        cause: Option<&(dyn Error + 'static)>,
+    ) -> Self {
+        let causes = successors(cause.and_then(Error::source), |&cause| cause.source());
+        let mut of_system = causes.filter_map(|cause| cause.downcast_ref::<io::Error>());
+        let hint = match kind {
+            "not_written" => Some("check that the folder exists, may be written to and has space left"),
+            _ if of_system.any(|cause| cause.kind() == ErrorKind::NotFound) => {
+                Some("check the path: no file is there; a relative path begins at the present folder")
+            }
+            "scene" => Some("config/touchup.yaml lists every parameter with its unit and range"),
+            _ => None,
+        };
+        Self { kind, message: one_line(&message.to_string()), hint, exit_code }
+    }
+
     /// A well-formed flag with an impossible value.
-    #[error("{0}; see --help")]
-    Usage(String),
-    #[error(transparent)]
-    Scene(#[from] crate::scene::SceneError),
-    #[error(transparent)]
-    ReadMesh(MeshFileError),
-    /// The same of the true part, which has a flag of its own.
-    #[error("{}", .0.to_string().replace("--mesh-unit", "--truth-unit"))]
-    ReadTruth(#[source] MeshFileError),
-    #[error(transparent)]
-    ReadRecording(RecordingError),
-    #[error(transparent)]
-    WriteMesh(MeshFileError),
-    #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
-    #[error(transparent)]
-    WriteRecording(RecordingError),
-    #[error(transparent)]
-    Session(#[from] crate::session::SessionError),
-    #[error(transparent)]
-    Touches(#[from] TouchesFileError),
-    #[error(transparent)]
-    Features(#[from] FeaturesFileError),
-    #[error(transparent)]
-    Simulate(#[from] SimError),
-    #[error(transparent)]
-    Mesh(#[from] crate::mesh::MeshError),
-    #[error(transparent)]
-    Setting(#[from] crate::stylus::SettingError),
-    #[error("cannot read stdin or write stdout: {0}")]
-    Stream(#[from] std::io::Error),
-    #[error("the scan cannot be refined: {0}")]
-    Refine(#[from] crate::haptic::RefineError),
-    #[error(transparent)]
-    Table(#[from] crate::io::table::TableError),
-    #[error("{path}: {error}", path = path.display())]
-    Calibration { path: PathBuf, error: Box<dyn Error + Send + Sync> },
-    #[error(transparent)]
-    Live(#[from] crate::live::LiveError),
-    #[error("the mesh cannot be aligned with the truth: {0}")]
-    Align(#[from] crate::align::IcpError),
-    #[error(transparent)]
-    AlignFeatures(#[from] crate::align::FeaturesError),
-    #[error("{0}")]
-    Arm(String),
-    #[error("feature {0}: {1}")]
-    Explore(u32, crate::probing::plan::ExploreError),
-    #[error(transparent)]
-    Report(#[from] NoReport),
-    #[error("the two cannot be compared: {0}")]
-    Compare(#[from] crate::compare::CompareError),
-    #[cfg(any(feature = "ros", feature = "r2r"))]
-    #[error(transparent)]
-    RosArguments(#[from] crate::ros::arguments::ArgumentError),
-    #[cfg(any(feature = "ros", feature = "r2r"))]
-    #[error(transparent)]
-    Node(#[from] NodeError),
-    #[cfg(any(feature = "ros", feature = "r2r"))]
-    #[error(transparent)]
-    Ros(#[from] crate::ros::RosError),
-    #[cfg(feature = "ur")]
-    #[error(transparent)]
-    UrSetup(#[from] crate::ur::SetupError),
-    #[cfg(feature = "ur")]
-    #[error(transparent)]
-    UrChild(#[from] crate::ur::child::ChildError),
+    pub fn usage(why: impl Display) -> Self {
+        Self::new(("usage", 2), format!("{why}; see --help"), None)
+    }
+
+    /// A mesh or recording that cannot be written.
+    pub fn not_written(error: impl Error + 'static) -> Self {
+        Self::new(NOT_WRITTEN, &error, Some(&error))
+    }
+
+    /// A true part that cannot be read; it has a flag of its own.
+    pub fn truth(error: MeshFileError) -> Self {
+        Self::new(("mesh", 3), error.to_string().replace("--mesh-unit", "--truth-unit"), Some(&error))
+    }
+
+    /// What is wrong in a file of a calibration.
+    pub fn calibration(path: &Path, error: impl Display) -> Self {
+        Self::new(("calibration", 3), format!("{}: {error}", path.display()), None)
+    }
+
+    /// What an arm, or its work, came to.
+    pub fn arm(error: impl Display) -> Self {
+        Self::new(("arm", 1), error, None)
+    }
+
+    /// Why a feature cannot be probed.
+    pub fn plan(flag: u32, error: ExploreError) -> Self {
+        Self::new(("plan", 2), format!("feature {flag}: {error}"), None)
+    }
+}
+
+/// Refuses a command line unless `is_allowed`.
+pub(super) fn require(is_allowed: bool, why: impl Display) -> Result<(), CliError> {
+    if is_allowed { Ok(()) } else { Err(CliError::usage(why)) }
+}
+
+/// Refuses the value of a flag that is not above 0.
+pub(super) fn require_positive(flag: &str, value: f64) -> Result<(), CliError> {
+    require(value > 0.0 && value.is_finite(), format_args!("{flag} {value} must be above 0"))
+}
+
+/// All words of `text` on one line.
+fn one_line(text: &str) -> String {
+    text.lines().map(str::trim).collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a command line, also one that cannot be parsed, asks for errors as JSON.
+pub(super) fn asks_for_json(arguments: &[OsString]) -> bool {
+    arguments.iter().any(|word| word == "--json")
+}
+
+/// Prints an error as one line on stderr.
+pub(super) fn print_error(as_json: bool, error: &CliError) -> ExitCode {
+    let json = || serde_json::to_string(error).expect("a number and texts alone cannot fail");
+    let line = if as_json { json() } else { format!("touchup: {}", error.message) };
+    // a closed pipe has no reader left
+    let _ = writeln!(stderr(), "{line}");
+    ExitCode::from(error.exit_code)
+}
+
+/// Prints arguments that cannot be parsed, or the help or version that they ask for (exit code 0).
+pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> ExitCode {
+    let exit_code = error.exit_code() as u8;
+    if exit_code == 0 || !as_json {
+        let _ = error.print();
+        return ExitCode::from(exit_code);
+    }
+    let text = error.to_string();
+    let message = text.split("\n\n").next().unwrap_or(&text);
+    let message = one_line(message.trim_start_matches("error: "));
+    let hint = Some("`touchup COMMAND --help` lists the flags of a command");
+    print_error(as_json, &CliError { kind: "usage", message, hint, exit_code })
+}
+
+/// The errors of the rooms: kind and exit code of each, and what its message begins with.
+macro_rules! errors_of_rooms {
+    ($($Error:ty => $kind_and_exit_code:expr, $before:literal;)*) => {$(
+        impl From<$Error> for CliError {
+            fn from(error: $Error) -> Self {
+                let of_kind: fn(&$Error) -> (&'static str, u8) = $kind_and_exit_code;
+                Self::new(of_kind(&error), format!(concat!($before, "{}"), error), Some(&error))
+            }
+        }
+    )*};
+}
+
+errors_of_rooms! {
+    crate::scene::SceneError => |_| ("scene", 3), "";
+    // settings come from a scene file: its flags are checked before
+    crate::stylus::SettingError => |_| ("scene", 3), "";
+    MeshFileError => |_| ("mesh", 3), "";
+    crate::mesh::MeshError => |_| ("mesh", 3), "";
+    crate::io::recording::RecordingError => |_| ("recording", 3), "";
+    crate::session::SessionError => |_| ("session", 3), "";
+    TouchesFileError => of_touches, "";
+    FeaturesFileError => of_features, "";
+    OutcomeError => |error| match error {
+        OutcomeError::WriteMesh(_) => NOT_WRITTEN,
+        OutcomeError::ReadMesh(_) | OutcomeError::Mesh(_) => ("mesh", 3),
+        OutcomeError::Touches(error) => of_touches(error),
+        OutcomeError::Features(error) => of_features(error),
+    }, "";
+    SimError => |error| match error {
+        SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. } => ("simulation", 2),
+        _ => ("simulation", 3),
+    }, "";
+    crate::haptic::RefineError => |_| ("refinement", 3), "the scan cannot be refined: ";
+    crate::live::LiveError => |_| ("refinement", 3), "";
+    crate::io::table::TableError => |_| ("calibration", 3), "";
+    crate::align::IcpError => |_| ("alignment", 3), "the mesh cannot be aligned with the truth: ";
+    crate::align::FeaturesError => |_| ("alignment", 3), "";
+    crate::compare::CompareError => |_| ("comparison", 3), "the two cannot be compared: ";
+    io::Error => |_| NOT_WRITTEN, "cannot read stdin or write stdout: ";
+}
+
+#[cfg(any(feature = "ros", feature = "r2r"))]
+errors_of_rooms! {
+    crate::ros::arguments::ArgumentError => |_| ("usage", 2), "";
+    crate::ros::RosError => |_| ("ros", 1), "";
+    NodeError => |error| match error {
+        NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
+        NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => ("node", 3),
+        NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => ("node", 3),
+        _ => ("node", 1),
+    }, "";
+}
+
+#[cfg(feature = "ur")]
+errors_of_rooms! {
+    crate::ur::SetupError => |_| ("arm", 1), "";
+    crate::ur::child::ChildError => |_| ("arm", 1), "";
+}
+
+fn of_touches(error: &TouchesFileError) -> (&'static str, u8) {
+    if matches!(error, TouchesFileError::File(FileError::Write { .. })) { NOT_WRITTEN } else { ("touches", 3) }
+}
+
+fn of_features(error: &FeaturesFileError) -> (&'static str, u8) {
+    if matches!(error, FeaturesFileError::File(FileError::Write { .. })) { NOT_WRITTEN } else { ("features", 3) }
 }
 
 impl From<ReplayError> for CliError {
     fn from(error: ReplayError) -> Self {
         match error {
-            ReplayError::Markers(what) => Self::Usage(what),
-            ReplayError::Read(error) => Self::ReadRecording(error),
-            ReplayError::Setting(error) => Self::Setting(error),
+            ReplayError::Markers(what) => Self::usage(what),
+            ReplayError::Read(error) => error.into(),
+            ReplayError::Setting(error) => error.into(),
         }
     }
-}
-
-impl From<OutcomeError> for CliError {
-    fn from(error: OutcomeError) -> Self {
-        match error {
-            OutcomeError::WriteMesh(error) => Self::WriteMesh(error),
-            OutcomeError::ReadMesh(error) => Self::ReadMesh(error),
-            OutcomeError::Touches(error) => Self::Touches(error),
-            OutcomeError::Features(error) => Self::Features(error),
-            OutcomeError::Mesh(error) => Self::Mesh(error),
-        }
-    }
-}
-
-impl CliError {
-    /// What is wrong in a file of a calibration.
-    pub fn calibration(path: &Path, error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
-        Self::Calibration { path: path.to_owned(), error: error.into() }
-    }
-
-    /// What an arm, or its work, came to.
-    pub fn arm(error: impl Display) -> Self {
-        Self::Arm(error.to_string())
-    }
-
-    /// Kind of the error, as `--json` names it, and exit code.
-    pub fn kind_and_exit_code(&self) -> (&'static str, u8) {
-        match self {
-            Self::Usage(_) => ("usage", 2),
-            Self::WriteMesh(_) | Self::WriteRecording(_) | Self::Write { .. } | Self::Stream(_) => ("not_written", 1),
-            Self::Touches(TouchesFileError::File(FileError::Write { .. })) => ("not_written", 1),
-            Self::Features(FeaturesFileError::File(FileError::Write { .. })) => ("not_written", 1),
-            // settings come from a scene file: its flags are checked before
-            Self::Scene(_) | Self::Setting(_) => ("scene", 3),
-            Self::ReadMesh(_) | Self::ReadTruth(_) | Self::Mesh(_) => ("mesh", 3),
-            Self::ReadRecording(_) => ("recording", 3),
-            Self::Session(_) => ("session", 3),
-            Self::Touches(_) => ("touches", 3),
-            Self::Features(_) => ("features", 3),
-            Self::Simulate(SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. }) => {
-                ("simulation", 2)
-            }
-            Self::Simulate(_) => ("simulation", 3),
-            Self::Refine(_) | Self::Live(_) => ("refinement", 3),
-            Self::Table(_) | Self::Calibration { .. } => ("calibration", 3),
-            Self::Align(_) | Self::AlignFeatures(_) => ("alignment", 3),
-            Self::Arm(_) => ("arm", 1),
-            Self::Explore(..) => ("plan", 2),
-            Self::Report(_) => ("report", 1),
-            Self::Compare(_) => ("comparison", 3),
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::RosArguments(_) => ("usage", 2),
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::Ros(_) => ("ros", 1),
-            #[cfg(any(feature = "ros", feature = "r2r"))]
-            Self::Node(error) => match error {
-                NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
-                NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => ("node", 3),
-                NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => ("node", 3),
-                _ => ("node", 1),
-            },
-            #[cfg(feature = "ur")]
-            Self::UrSetup(_) | Self::UrChild(_) => ("arm", 1),
-        }
-    }
-}
-
-/// Why there is no report.
-#[derive(Debug, thiserror::Error)]
-pub enum NoReport {
-    /// It is not installed.
-    #[error(
-        "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
-         touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without"
-    )]
-    Missing,
-    /// It does not start.
-    #[error("cannot start {}: {source}", path.display())]
-    Start {
-        /// the program
-        path: PathBuf,
-        /// why not
-        source: std::io::Error,
-    },
 }

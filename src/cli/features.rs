@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, counted, print_report};
+use super::{CliError, Losses, check_kept, counted, print_report, require};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
@@ -63,7 +63,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
             check_kept("--touches", touches, out)?;
         }
     }
-    let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
     let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
     let (table, file) = match arguments.mode {
@@ -90,16 +90,10 @@ impl FeaturesArguments {
     /// Flags that do not go together.
     fn check(&self) -> Result<(), CliError> {
         let is_paper = self.mode == FeaturesMode::Paper;
-        if self.clusters.is_some() && !is_paper {
-            return Err(CliError::Usage("--clusters is for --mode paper".to_owned()));
-        }
-        if self.touches.is_some() && is_paper {
-            return Err(CliError::Usage("--touches measures features, and --mode paper has none".to_owned()));
-        }
-        if !(self.threshold_per_mm2 > 0.0 && self.threshold_per_mm2.is_finite()) {
-            return Err(CliError::Usage("--threshold-per-mm2 must be above 0".to_owned()));
-        }
-        Ok(())
+        let is_above_0 = self.threshold_per_mm2 > 0.0 && self.threshold_per_mm2.is_finite();
+        require(self.clusters.is_none() || is_paper, "--clusters is for --mode paper")?;
+        require(self.touches.is_none() || !is_paper, "--touches measures features, and --mode paper has none")?;
+        require(is_above_0, "--threshold-per-mm2 must be above 0")
     }
 
     fn find_clusters(&self, mesh: &TriMesh) -> Vec<Cluster> {

@@ -12,7 +12,6 @@ use crate::sim::{TruthFeature, TruthShape};
 
 reported! {
     /// A true feature and what was found of it; lengths in mm, angles in degrees.
-    #[derive(Debug, Serialize)]
     pub(super) struct FoundFeature, fn of(truth: &TruthFeature, record: Option<&FeatureRecord>) {
         name: &'static str = truth.name,
         /// its number in features.json; `null`: not found
@@ -122,9 +121,7 @@ fn axis_off_deg(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
 impl fmt::Display for FoundTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<14} {:>22} {:>26} {:>10}   center, axis off   touched", "feature", "true, mm", "found", "error")?;
-        for feature in &self.features {
-            write!(f, "\n{feature}")?;
-        }
+        self.features.iter().try_for_each(|feature| write!(f, "\n{feature}"))?;
         match self.invented {
             0 => write!(f, "\nnone invented"),
             count => write!(f, "\n{count} invented"),

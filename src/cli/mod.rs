@@ -12,7 +12,6 @@ mod demo;
 mod demo_robot;
 mod disagree;
 mod error;
-mod failure;
 mod features;
 mod found;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -31,14 +30,12 @@ mod report;
 mod simulate;
 mod step;
 mod threads;
-mod touched;
 #[cfg(feature = "ur")]
 mod ur;
 
 pub use threads::Threads;
 
-use error::{CliError, Losses};
-use failure::{ErrorForm, Failure};
+use error::{CliError, Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use output::notify;
 use output::{
@@ -130,19 +127,19 @@ enum Verb {
 /// Runs the verb that `arguments` name, the program's own name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (arguments, ros) = split(arguments);
-    let form = ErrorForm::of(&arguments);
+    let as_json = asks_for_json(&arguments);
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
-        Err(error) => return form.print_parse_error(&error),
+        Err(error) => return print_parse_error(as_json, &error),
     };
     let ended = ros_arguments(&arguments.verb, ros).and_then(|ros| arguments.verb.run(&ros));
     match ended {
         Ok(losses) if losses.is_empty() => ExitCode::SUCCESS,
         Ok(losses) => {
             let message = format!("done with losses: {}", losses.join("; "));
-            form.print(&Failure { kind: "losses", message, hint: None, exit_code: 4 })
+            print_error(as_json, &CliError { kind: "losses", message, hint: None, exit_code: 4 })
         }
-        Err(error) => form.print(&Failure::of(&error)),
+        Err(error) => print_error(as_json, &error),
     }
 }
 
@@ -192,14 +189,10 @@ impl Verb {
 
 /// Arguments behind `--ros-args`, for the verbs that take it.
 fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliError> {
-    if !given.is_empty() && !verb.takes_ros_arguments() {
-        return Err(CliError::Usage("--ros-args is for the verbs node and replay".to_owned()));
-    }
-    let text = |word: OsString| {
-        word.into_string()
-            .map_err(|word| CliError::Usage(format!("--ros-args … {}: arguments of ROS are UTF-8", word.display())))
-    };
-    given.into_iter().map(text).collect()
+    let is_allowed = given.is_empty() || verb.takes_ros_arguments();
+    require(is_allowed, "--ros-args is for the verbs node and replay")?;
+    let not_text = |word: OsString| format!("--ros-args … {}: arguments of ROS are UTF-8", word.display());
+    given.into_iter().map(|word| word.into_string().map_err(|word| CliError::usage(not_text(word)))).collect()
 }
 
 /// The default log filter: that of `--log-level` behind `--ros-args`, else warnings.

@@ -9,7 +9,7 @@ use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
-use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result};
+use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require};
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
@@ -62,17 +62,14 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
     if robot == "none" {
         return Ok(None);
     }
-    if config.parameters.string("source") != "probe" {
-        return Err(CliError::Usage(format!("robot:={robot} touches with a probe: say source:=probe as well")));
-    }
+    let why = format!("robot:={robot} touches with a probe: say source:=probe as well");
+    require(config.parameters.string("source") == "probe", why)?;
     let kind = match robot {
         "sim" => {
             let part = config.parameters.string("sim_part");
-            if part.is_empty() {
-                return Err(CliError::Usage("robot:=sim needs the part that it touches: -p sim_part:=MESH".to_owned()));
-            }
+            require(!part.is_empty(), "robot:=sim needs the part that it touches: -p sim_part:=MESH")?;
             let unit = mesh_unit(&config.parameters);
-            let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::ReadTruth)?;
+            let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::truth)?;
             ArmKind::Sim(Box::new(mesh))
         }
         _ => ArmKind::Real(connect_ur(scene)?),
@@ -84,11 +81,9 @@ impl NodeArguments {
     /// The flag overrides files of parameters, which may name a scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
         let Some(scene) = &self.scene else { return Ok(()) };
-        let path = scene.to_str().ok_or_else(|| {
-            CliError::Usage(format!("--scene {}: parameters of ROS are UTF-8, rename the file", scene.display()))
-        })?;
-        let set = config.parameters.set("scene", &ParameterValue::String(path.to_owned()));
-        set.map_err(|error| CliError::Usage(error.to_string()))
+        let why = format!("--scene {}: parameters of ROS are UTF-8, rename the file", scene.display());
+        let path = scene.to_str().ok_or_else(|| CliError::usage(why))?;
+        config.parameters.set("scene", &ParameterValue::String(path.to_owned())).map_err(CliError::usage)
     }
 }
 
@@ -147,16 +142,12 @@ impl fmt::Display for SessionReport {
         )?;
         writeln!(f, "contacts: {}; updates cut back: {}", self.contacts, self.cut_back)?;
         let us = |ns: u64| ns as f64 * 1e-3;
-        let line = |f: &mut fmt::Formatter<'_>, what: &str, Quantiles { median, p99, p999, max }: Quantiles| {
+        let line = |Quantiles { median, p99, p999, max }: Quantiles| {
             let [median, p99, p999, max] = [median, p99, p999, max].map(us);
-            write!(f, "{what}: median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
+            format!("median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
         };
-        line(f, "push", self.push_ns)?;
-        writeln!(f)?;
-        line(f, "arrival to mesh", self.latency_ns)?;
-        if let Some(patch) = self.result.as_ref().and_then(|result| result.patch.as_ref()) {
-            write!(f, "\n{patch}")?;
-        }
-        Ok(())
+        write!(f, "push: {}\narrival to mesh: {}", line(self.push_ns), line(self.latency_ns))?;
+        let patch = self.result.as_ref().and_then(|result| result.patch.as_ref());
+        patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))
     }
 }

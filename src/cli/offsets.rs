@@ -11,7 +11,7 @@ use crate::stylus::{ClockOffset, ContactSample, SettingError};
 
 reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
-    #[derive(Clone, Copy, Debug, Serialize)]
+    #[derive(Clone, Copy)]
     pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied_ns: i64) {
         /// total offset: that which the scene applies, and the correction
         wrench_offset_ms: f64 = found.offset * 1e3 + applied_ns as f64 * 1e-6,
@@ -43,7 +43,7 @@ pub(super) enum ScanOffset {
 }
 
 reported! {
-    #[derive(Clone, Debug, Serialize)]
+    #[derive(Clone)]
     pub(super) struct FoundOffset, fn of(found: &Registration) {
         /// of the middle of the contacts, and its standard uncertainty
         shift_mm: [f64; 3] = three(&found.twist, 0, 1e3),

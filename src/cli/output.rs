@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::error::CliError;
+use super::error::{CliError, require};
 use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
+use crate::io::file_error::FileError;
 
 /// One line, or several, on stdout. A reader that has gone away is no error of ours.
 pub(super) fn print_result(text: &str) {
@@ -34,7 +35,7 @@ pub(super) fn notify(line: &str) {
 
 /// Makes the error of a file or folder that cannot be written.
 pub(super) fn not_written(path: &Path) -> impl FnOnce(io::Error) -> CliError {
-    |source| CliError::Write { path: path.to_owned(), source }
+    |source| CliError::not_written(FileError::Write { path: path.to_owned(), source })
 }
 
 /// Writes a result as JSON.
@@ -50,11 +51,9 @@ pub(super) fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), 
 
 /// … by the flag `by`.
 pub(super) fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
-    if !is_same_file(input, output) {
-        return Ok(());
-    }
     let path = output.display();
-    Err(CliError::Usage(format!("{by} would write over {path}, which {flag} reads: choose another place")))
+    let why = format!("{by} would write over {path}, which {flag} reads: choose another place");
+    require(!is_same_file(input, output), why)
 }
 
 /// Checks that a file can be written.
@@ -74,12 +73,10 @@ pub(super) fn check_outputs(
     for (flag, ending, path) in outputs {
         let Some(path) = path else { continue };
         let shown = path.display();
-        if !shown.to_string().to_ascii_lowercase().ends_with(ending) {
-            return Err(CliError::Usage(format!("{flag} {shown} must end in {ending}")));
-        }
-        if inputs.iter().flatten().any(|input| is_same_file(input, path)) {
-            return Err(CliError::Usage(format!("{flag} would write over {shown}, which is {used}")));
-        }
+        let is_of_kind = shown.to_string().to_ascii_lowercase().ends_with(ending);
+        require(is_of_kind, format_args!("{flag} {shown} must end in {ending}"))?;
+        let is_read = inputs.iter().flatten().any(|input| is_same_file(input, path));
+        require(!is_read, format_args!("{flag} would write over {shown}, which is {used}"))?;
         check_place(path)?;
     }
     Ok(())

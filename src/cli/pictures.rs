@@ -6,7 +6,7 @@ use std::time::SystemTime;
 use chrono::{DateTime, Utc};
 use nalgebra::Vector3;
 
-use super::error::CliError;
+use super::error::{CliError, require};
 use super::output::not_written;
 use crate::compare::{PicturePanel, PictureParams, Rgb, draw_picture};
 use crate::io::mesh_file::{MeshUnit, VertexColumn, write_mesh_with};
@@ -25,12 +25,9 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// The direction that `--view` names.
 pub(super) fn view_from(view: Option<&Vec<f64>>) -> Result<Option<Vector3<f64>>, CliError> {
-    match view {
-        Some(view) if !view.iter().all(|x| x.is_finite()) || view.iter().all(|x| *x == 0.0) => {
-            Err(CliError::Usage("--view must be a direction, such as 1,-1,0.5".to_owned()))
-        }
-        view => Ok(view.map(|view| Vector3::from_column_slice(view))),
-    }
+    let is_direction = |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);
+    require(view.is_none_or(is_direction), "--view must be a direction, such as 1,-1,0.5")?;
+    Ok(view.map(|view| Vector3::from_column_slice(view)))
 }
 
 /// Draws panels beside each other into a file.
@@ -55,5 +52,5 @@ pub(super) fn write_coloured(
     let named = ["red", "green", "blue"].into_iter().enumerate();
     let channels = named.map(|(at, name)| VertexColumn { name, values: channel(at) });
     let columns: Vec<_> = channels.chain(further).collect();
-    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::WriteMesh)
+    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::not_written)
 }

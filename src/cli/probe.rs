@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of};
-use super::{CliError, Losses, counted, print_report};
+use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
 
@@ -71,9 +71,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
 impl ProbeArguments {
     fn flags(&self) -> Result<Vec<Flag>, CliError> {
         let radius = self.search_radius_mm / 1e3;
-        if !(radius > 0.0 && radius.is_finite()) {
-            return Err(CliError::Usage(format!("--search-radius-mm {} must be above 0", self.search_radius_mm)));
-        }
+        require_positive("--search-radius-mm", self.search_radius_mm)?;
         (1..).zip(&self.features).map(|(id, text)| flag_of(id, text, radius)).collect()
     }
 
@@ -81,22 +79,17 @@ impl ProbeArguments {
     fn narrow(&self, ready: &mut Ready) -> Result<(), CliError> {
         let by = Narrower { force: self.max_force_n, time: self.max_duration_s, ..Narrower::default() };
         let wanted_mm = ready.tolerance_mm();
-        ready.params = ready.params.narrowed(&by).map_err(|error| CliError::Usage(error.to_string()))?;
+        ready.params = ready.params.narrowed(&by).map_err(CliError::usage)?;
         let params = &mut ready.params;
         params.slides = self.slide;
         if let Some(touches) = self.max_touches {
-            if touches == 0 || touches > params.pattern.budget {
-                let most = params.pattern.budget;
-                return Err(CliError::Usage(format!(
-                    "--max-touches {touches} must be 1 to {most}, as the scene has it"
-                )));
-            }
+            let most = params.pattern.budget;
+            let why = format!("--max-touches {touches} must be 1 to {most}, as the scene has it");
+            require((1..=most).contains(&touches), why)?;
             params.pattern.budget = touches;
         }
         if let Some(tolerance_mm) = self.tolerance_mm {
-            if !(tolerance_mm > 0.0 && tolerance_mm.is_finite()) {
-                return Err(CliError::Usage(format!("--tolerance-mm {tolerance_mm} must be above 0")));
-            }
+            require_positive("--tolerance-mm", tolerance_mm)?;
             params.pattern.sigma *= tolerance_mm / wanted_mm;
         }
         Ok(())
@@ -120,21 +113,24 @@ impl ProbeArguments {
     }
 }
 
-/// What `--dry-run --json` prints.
-#[derive(Debug, Serialize)]
-struct DryRunReport {
-    features: Vec<PlannedFeature>,
-    picture: PathBuf,
+reported! {
+    /// What `--dry-run --json` prints.
+    struct DryRunReport, fn of(flags: &[Flag], plans: &[Plan], drawn: PathBuf) {
+        features: Vec<PlannedFeature> =
+            flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
+        picture: PathBuf = drawn,
+    }
 }
 
-/// The plan for one flag.
-#[derive(Debug, Serialize)]
-struct PlannedFeature {
-    flag: u32,
-    touches: usize,
-    unreachable_touches: Vec<Unreachable>,
-    slides: usize,
-    unreachable_slides: Vec<Unreachable>,
+reported! {
+    /// The plan for one flag.
+    struct PlannedFeature, fn of(id: u32, plan: &Plan) {
+        flag: u32 = id,
+        touches: usize = plan.touches.len(),
+        unreachable_touches: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::touch).collect(),
+        slides: usize = plan.slides.len(),
+        unreachable_slides: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::slide).collect(),
+    }
 }
 
 /// A touch or slide that cannot be made.
@@ -145,28 +141,15 @@ struct Unreachable {
     reason: String,
 }
 
-impl DryRunReport {
-    fn of(flags: &[Flag], plans: &[Plan], picture: PathBuf) -> Self {
-        Self {
-            features: flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
-            picture,
-        }
+impl Unreachable {
+    fn touch(HeldBack { what, why }: &HeldBack) -> Option<Self> {
+        let PlannedMotion::Touch(number) = *what else { return None };
+        Some(Self { number, reason: why.clone() })
     }
-}
 
-impl PlannedFeature {
-    fn of(flag: u32, plan: &Plan) -> Self {
-        let [touches, slides] = [plan.touches.len(), plan.slides.len()];
-        let mut planned =
-            Self { flag, touches, unreachable_touches: Vec::new(), slides, unreachable_slides: Vec::new() };
-        for HeldBack { what, why } in &plan.held_back {
-            let (unreachable, number) = match *what {
-                PlannedMotion::Touch(number) => (&mut planned.unreachable_touches, number),
-                PlannedMotion::Slide(number) => (&mut planned.unreachable_slides, number),
-            };
-            unreachable.push(Unreachable { number, reason: why.clone() });
-        }
-        planned
+    fn slide(HeldBack { what, why }: &HeldBack) -> Option<Self> {
+        let PlannedMotion::Slide(number) = *what else { return None };
+        Some(Self { number, reason: why.clone() })
     }
 }
 

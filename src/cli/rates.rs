@@ -4,8 +4,6 @@ use std::sync::Arc;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
 use super::{counted, reported};
 use crate::haptic::{RefineError, RefineParams, Refiner};
 use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
@@ -18,7 +16,6 @@ const ROOM: usize = 1 << 18;
 
 reported! {
     /// What `--json` prints of `--live`.
-    #[derive(Debug, Serialize)]
     pub(super) struct LiveSummary, fn of(behind: &Latencies, counts: LiveCounts) {
         /// how old the touches are that the mesh shows, in time of the samples
         behind_ns: Quantiles = behind.quantiles(),
@@ -46,27 +43,24 @@ struct RealTime {
 }
 
 impl Rates {
-    /// As fast as samples can be read.
+    /// - `is_live`: in real time; else as fast as samples can be read.
     ///
     /// # Errors
     /// As [`Engine::new`].
-    pub fn at_once(mesh: TriMesh, refine: RefineParams, patch: Option<PatcherParams>) -> Result<Self, LiveError> {
-        let engine = Engine::new(mesh, refine, patch, Renewal::AtEnd)?;
-        Ok(Self { engine, real_time: None, stopped: None })
-    }
-
-    /// In real time.
-    ///
-    /// # Errors
-    /// As [`Engine::new`].
-    pub fn live(mesh: TriMesh, refine: RefineParams, patch: PatcherParams) -> Result<Self, LiveError> {
-        let tree = FaceTree::new(&mesh);
-        let scan = Arc::new((mesh.clone(), tree));
-        let scan_bytes = scan.0.bytes() + scan.1.bytes();
-        let renewal = Renewal::Beside { scan, pace: Pace::default(), room: ROOM, gate: Gate::default() };
-        let engine = Engine::new(mesh, refine, Some(patch), renewal)?;
-        let real_time = RealTime { scan_bytes, begun: None, behind: Latencies::new() };
-        Ok(Self { engine, real_time: Some(real_time), stopped: None })
+    pub fn new(
+        mesh: TriMesh,
+        refine: RefineParams,
+        patch: Option<PatcherParams>,
+        is_live: bool,
+    ) -> Result<Self, LiveError> {
+        let (mut renewal, mut real_time) = (Renewal::AtEnd, None);
+        if is_live {
+            let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
+            let scan_bytes = scan.0.bytes() + scan.1.bytes();
+            renewal = Renewal::Beside { scan, pace: Pace::default(), room: ROOM, gate: Gate::default() };
+            real_time = Some(RealTime { scan_bytes, begun: None, behind: Latencies::new() });
+        }
+        Ok(Self { engine: Engine::new(mesh, refine, patch, renewal)?, real_time, stopped: None })
     }
 
     /// Memory of the scan and its tree that the patch has for itself, bytes.

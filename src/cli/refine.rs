@@ -13,8 +13,8 @@ use tracing::{debug, warn};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
-use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report};
-use crate::haptic::{RefineCounts, RefineError, RefineParams};
+use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
+use crate::haptic::{RefineCounts, RefineError, RefineParams, Refiner};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
 use crate::io::recording::Topics;
@@ -97,46 +97,50 @@ fn path_or_none() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }
 
-/// What `--json` prints; times in s, `push_ns` in ns.
-#[derive(Debug, Serialize)]
-pub(super) struct RefineSummary {
-    /// stages built from the scene, those left out, and the memory at start
-    scene: SceneCost,
-    /// wrenches of the recording: each could be a sample
-    samples: u64,
-    /// those that the refiner took
-    accepted: u64,
-    /// those that it refused, by reason; `pose_…` are lost poses and not samples
-    refused: BTreeMap<String, u64>,
-    /// times that the stylus came into contact
-    contacts: u64,
-    /// of the markers, where they give the pose
-    #[serde(skip_serializing_if = "Option::is_none")]
-    markers: Option<MarkerCounts>,
-    /// how late the clock of the wrench reads beyond what the scene says, where the touches determine it and the scene has `clock`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    wrench_offset: Option<WrenchOffset>,
-    /// rigid offset of the scan from the part, with --registration
-    #[serde(skip_serializing_if = "Option::is_none")]
-    registration: Option<ScanOffset>,
-    /// faces that are not where the scan had them
-    moved_faces: u64,
-    /// updates made smaller because a face would have folded
-    cut_back: u64,
-    /// of the ball on the part; `null` when it never slid far enough
-    friction: Option<FrictionFound>,
-    /// of one sample through the whole chain
-    push_ns: Quantiles,
-    load_s: f64,
-    replay_s: f64,
-    /// of the patch beside the samples, with --live
-    #[serde(skip_serializing_if = "Option::is_none")]
-    live: Option<LiveSummary>,
-    /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
-    patch: Option<PatchSummary>,
-    /// how well that is known; not there when the scene has no `uncertainty`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    uncertainty: Option<UncertaintySummary>,
+reported! {
+    /// What `--json` prints; times in s, `push_ns` in ns.
+    pub(super) struct RefineSummary, fn of(
+        cost: SceneCost,
+        replayed: &Replayed,
+        pushes: Pushes,
+        refiner: &Refiner,
+        outcome: Outcome,
+        offsets: (Option<WrenchOffset>, Option<ScanOffset>),
+        timing: ([f64; 2], Option<LiveSummary>)
+    ) {
+        /// stages built from the scene, those left out, and the memory at start
+        scene: SceneCost = cost,
+        /// wrenches of the recording: each could be a sample
+        samples: u64 = replayed.wrenches,
+        /// those that the refiner took
+        accepted: u64 = pushes.accepted - refiner.counts().outside_region,
+        /// those that it refused, by reason; `pose_…` are lost poses and not samples
+        refused: BTreeMap<String, u64> = pushes.refused,
+        /// times that the stylus came into contact
+        contacts: u64 = refiner.counts().contacts,
+        /// of the markers, where they give the pose
+        markers?: MarkerCounts = replayed.markers,
+        /// how late the clock of the wrench reads beyond what the scene says, where the touches determine it and the scene has `clock`
+        wrench_offset?: WrenchOffset = offsets.0,
+        /// rigid offset of the scan from the part, with --registration
+        registration?: ScanOffset = offsets.1,
+        /// faces that are not where the scan had them
+        moved_faces: u64 = outcome.moved_faces,
+        /// updates made smaller because a face would have folded
+        cut_back: u64 = refiner.counts().cut_back,
+        /// of the ball on the part; `null` when it never slid far enough
+        friction: Option<FrictionFound> = refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
+        /// of one sample through the whole chain
+        push_ns: Quantiles = pushes.latencies.quantiles(),
+        load_s: f64 = timing.0[0],
+        replay_s: f64 = timing.0[1],
+        /// of the patch beside the samples, with --live
+        live?: LiveSummary = timing.1,
+        /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
+        patch: Option<PatchSummary> = outcome.patch,
+        /// how well that is known; not there when the scene has no `uncertainty`
+        uncertainty?: UncertaintySummary = outcome.uncertainty,
+    }
 }
 
 /// Coefficient of kinetic friction and its standard error.
@@ -266,7 +270,7 @@ impl RefineArguments {
             self.touches_out.get_or_insert_with(|| session.join("touches.csv"));
         } else if let Some(path) = self.scene.as_ref().filter(|_| self.scan.as_os_str().is_empty()) {
             let scan = Scene::read(path)?.scan_file(path);
-            (self.scan, self.mesh_unit) = scan.ok_or_else(|| CliError::Usage(NO_SCAN.to_owned()))?;
+            (self.scan, self.mesh_unit) = scan.ok_or_else(|| CliError::usage(NO_SCAN))?;
         }
         Ok(self)
     }
@@ -276,22 +280,18 @@ impl RefineArguments {
         let scene = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
-        let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit).map_err(CliError::ReadMesh)?;
+        let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit)?;
         let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        let recording = Recording::open(&self.bag, &topics).map_err(CliError::ReadRecording)?;
-        let params =
-            scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::Usage(NOTHING_MOVES.to_owned()))?;
+        let recording = Recording::open(&self.bag, &topics)?;
+        let params = scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
         let params = cut.refine_params(params);
         let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
-        let mut rates = match patch {
-            Some(patch) if self.live => Rates::live(mesh, params, patch)?,
-            None if self.live => return Err(CliError::Usage(NO_PATCH.to_owned())),
-            patch => Rates::at_once(mesh, params, patch)?,
-        };
+        require(patch.is_some() || !self.live, NO_PATCH)?;
+        let mut rates = Rates::new(mesh, params, patch, self.live)?;
         if !self.strokes.is_empty() {
             rates.engine.keep_strokes();
         }
@@ -312,9 +312,13 @@ impl RefineArguments {
         // an update that takes every sample for contact says nothing about contact
         let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        let mut at_each = || progress.step();
-        let mut replayed =
-            each_sample(recording, scene.placement(), scene.sync_params(), markers, &mut at_each, |sample| {
+        let mut replayed = each_sample(
+            recording,
+            scene.placement(),
+            scene.sync_params(),
+            markers,
+            &mut || progress.step(),
+            |sample| {
                 change_strokes(sample.stamp_ns, &mut rates);
                 pushes.push(&mut rates, sample);
                 let contact = match &mut observer {
@@ -327,7 +331,8 @@ impl RefineArguments {
                 if let (Some(contacts), Some(contact)) = (&mut contacts, contact) {
                     contacts.push(contact);
                 }
-            })?;
+            },
+        )?;
         change_strokes(i64::MAX, &mut rates);
         let registration = contacts
             .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
@@ -343,7 +348,7 @@ impl RefineArguments {
             touches: self.touches_out.as_deref(),
             outside: cut.outside.as_ref(),
         };
-        let Outcome { moved_faces, patch, uncertainty, .. } = places.write(&as_scanned, refiner.mesh(), patcher)?;
+        let outcome = places.write(&as_scanned, refiner.mesh(), patcher)?;
         drop(stage);
         debug!(?counts, "replayed");
         replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
@@ -356,32 +361,15 @@ impl RefineArguments {
         if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {
             warn!("the stylus never came into contact: no force was above contact.on_n, so the mesh is as scanned");
         }
-        let mut refused = pushes.refused;
-        refused.extend(replayed.refused);
+        pushes.refused.extend(std::mem::take(&mut replayed.refused));
         if counts.outside_region > 0 {
-            refused.insert("outside_region".to_owned(), counts.outside_region);
+            pushes.refused.insert("outside_region".to_owned(), counts.outside_region);
         }
-        let summary = RefineSummary {
-            scene: cost,
-            samples: replayed.wrenches,
-            accepted: pushes.accepted - counts.outside_region,
-            refused,
-            contacts: counts.contacts,
-            markers: replayed.markers,
-            registration,
-            wrench_offset: clock
-                .and_then(|clock| clock.offset())
-                .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns)),
-            moved_faces,
-            cut_back: counts.cut_back,
-            friction: refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
-            push_ns: pushes.latencies.quantiles(),
-            load_s,
-            replay_s,
-            live,
-            patch,
-            uncertainty,
-        };
+        let wrench_offset = clock
+            .and_then(|clock| clock.offset())
+            .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns));
+        let (offsets, timing) = ((wrench_offset, registration), ([load_s, replay_s], live));
+        let summary = RefineSummary::of(cost, &replayed, pushes, &refiner, outcome, offsets, timing);
         Ok(Refined { repair, summary, losses: replayed.losses })
     }
 
@@ -395,11 +383,12 @@ impl RefineArguments {
 
     /// Checks that the result can be written before the work begins.
     fn check_out(&self) -> Result<(), CliError> {
+        let out = self.out.display();
         check_target(&self.out).map_err(|error| match error {
-            MeshFileError::UnknownFormat { path } => {
-                CliError::Usage(format!("--out {} must end in .ply, .stl or .obj", path.display()))
+            MeshFileError::UnknownFormat { .. } => {
+                CliError::usage(format!("--out {out} must end in .ply, .stl or .obj"))
             }
-            error => CliError::WriteMesh(error),
+            error => CliError::not_written(error),
         })?;
         let outputs = [
             ("--out", Some(&self.out)),
@@ -413,10 +402,8 @@ impl RefineArguments {
         });
         for (at, (flag, out)) in outputs.iter().enumerate() {
             if let Some((other, _)) = outputs[..at].iter().find(|(_, other)| other == out || is_same_file(other, out)) {
-                let path = out.display();
-                return Err(CliError::Usage(format!(
-                    "{flag} and {other} would both write {path}: choose another place"
-                )));
+                let why = format!("{flag} and {other} would both write {}: choose another place", out.display());
+                return Err(CliError::usage(why));
             }
             for (read, input) in &inputs {
                 check_kept_by(flag, read, input, out)?;
@@ -442,7 +429,7 @@ impl RefineArguments {
             scene.refine.get_or_insert_default().mode = mode;
         }
         // the file was in range when it was read: what is not now came by a flag
-        scene.validate().map_err(|error| CliError::Usage(error.to_string()))?;
+        scene.validate().map_err(CliError::usage)?;
         Ok(scene)
     }
 }
@@ -483,12 +470,10 @@ impl RefineSummary {
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.verdict())?;
-        if let Some(last) = self.uncertainty.as_ref().and_then(UncertaintySummary::last_outlier) {
-            write!(f, "\n{last}")?;
-        }
-        if let Some(FrictionFound { mu, sigma }) = &self.friction {
-            write!(f, "\nfriction: {mu:.3} ± {sigma:.3}")?;
-        }
+        let last_outlier = self.uncertainty.as_ref().and_then(UncertaintySummary::last_outlier);
+        last_outlier.iter().try_for_each(|last| write!(f, "\n{last}"))?;
+        let friction = &self.friction;
+        friction.iter().try_for_each(|FrictionFound { mu, sigma }| write!(f, "\nfriction: {mu:.3} ± {sigma:.3}"))?;
         if let Some(MarkerCounts { held, coasting, lost, relabelled, rejected }) = self.markers {
             write!(
                 f,
@@ -496,12 +481,8 @@ impl fmt::Display for RefineSummary {
                  relabelled, {rejected} rejected"
             )?;
         }
-        if let Some(clock) = &self.wrench_offset {
-            write!(f, "\nclock: {clock}")?;
-        }
-        if let Some(registration) = &self.registration {
-            write!(f, "\nscan: {registration}")?;
-        }
+        self.wrench_offset.iter().try_for_each(|clock| write!(f, "\nclock: {clock}"))?;
+        self.registration.iter().try_for_each(|registration| write!(f, "\nscan: {registration}"))?;
         self.live.iter().try_for_each(|live| write!(f, "\n{live}"))
     }
 }

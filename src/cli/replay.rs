@@ -77,15 +77,13 @@ struct Played {
 /// - `ros`: the arguments behind `--ros-args`.
 pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::named("touchup_replay", ros, |name| std::env::var(name).ok())?;
-    let source = config.parameters.set("source", &ParameterValue::String(arguments.source.clone()));
-    source.map_err(|error| CliError::Usage(error.to_string()))?;
-    let markers = match &arguments.scene {
-        Some(scene) => marker_filter(&Scene::read(scene)?, arguments.markers_topic.as_deref())?,
-        None => None,
-    };
+    let source = ParameterValue::String(arguments.source.clone());
+    config.parameters.set("source", &source).map_err(CliError::usage)?;
+    let scene = arguments.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+    let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
-    let recording = Recording::open(&arguments.recording, &topics).map_err(CliError::ReadRecording)?;
+    let recording = Recording::open(&arguments.recording, &topics)?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 
@@ -110,8 +108,8 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     };
     let mut order = StampOrder::default();
     let mut progress = WorkProgress::new("replay", recording.message_count());
-    let mut at_each = || progress.step();
-    let replayed = each_message(recording, markers, &mut at_each, |message| order.push(message, &mut publish))?;
+    let replayed =
+        each_message(recording, markers, &mut || progress.step(), |message| order.push(message, &mut publish))?;
     order.finish(&mut publish);
     played.played_s = began.elapsed().as_secs_f64();
     let listeners = port.listeners();

@@ -6,7 +6,10 @@ use std::process::Command;
 
 use clap::Args;
 
-use super::error::{CliError, Losses, NoReport};
+use super::error::{CliError, Losses};
+
+const MISSING: &str = "touchup-report is neither beside this program nor on the path: `cargo install --locked --path crates/touchup-report` in \
+     touchup's folder puts it there, `cargo run --release -p touchup-report -- --out out` does without";
 
 /// The program, beside this one or on the path.
 const PROGRAM: &str = "touchup-report";
@@ -22,9 +25,10 @@ pub(super) struct HandedOver {
 pub(super) fn report(arguments: &HandedOver) -> Result<Losses, CliError> {
     let beside = std::env::current_exe().ok().map(|this| this.with_file_name(PROGRAM)).filter(|path| path.is_file());
     let path = beside.unwrap_or_else(|| PROGRAM.into());
-    let status = Command::new(&path).args(&arguments.arguments).status().map_err(|source| match source.kind() {
-        ErrorKind::NotFound => NoReport::Missing,
-        _ => NoReport::Start { path, source },
+    let status = Command::new(&path).args(&arguments.arguments).status().map_err(|source| {
+        let not_started = || format!("cannot start {}: {source}", path.display());
+        let is_missing = source.kind() == ErrorKind::NotFound;
+        CliError::new(("report", 1), if is_missing { MISSING.to_owned() } else { not_started() }, None)
     })?;
     // what went wrong it has said itself
     if status.success() { Ok(Losses::new()) } else { std::process::exit(status.code().unwrap_or(1)) }

@@ -8,7 +8,7 @@ use clap::Args;
 use tracing::warn;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, check_kept, not_written, print_result};
+use super::{CliError, Losses, check_kept, not_written, print_result, require};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
@@ -66,13 +66,11 @@ pub(super) struct SimulateArguments {
 
 /// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
-    if !TIP_RADII_MM.contains(&arguments.tip_radius_mm) {
-        let (given, smallest, largest) = (arguments.tip_radius_mm, TIP_RADII_MM.start(), TIP_RADII_MM.end());
-        return Err(CliError::Usage(format!("--tip-radius-mm {given} must be {smallest} to {largest} mm")));
-    }
+    let (given, smallest, largest) = (arguments.tip_radius_mm, TIP_RADII_MM.start(), TIP_RADII_MM.end());
+    let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
+    require(TIP_RADII_MM.contains(&given), why)?;
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
-    let MeshFile { mesh: truth, repair } =
-        read_mesh(&arguments.truth, arguments.mesh_unit).map_err(CliError::ReadMesh)?;
+    let MeshFile { mesh: truth, repair } = read_mesh(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
         warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
     }
@@ -90,26 +88,19 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         friction: arguments.friction,
         ..StylusParams::default()
     };
-    let model = TouchModel { stylus, camera: arguments.markers.then(CameraParams::default), seed: arguments.seed };
+    let camera = arguments.markers.then(CameraParams::default);
     let hand = PathParams { radius, ..PathParams::default() };
     let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
-    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &model, &arguments.out)?;
+    let out = &arguments.out;
+    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &stylus, camera.as_ref(), out)?;
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
     print_result(&format!(
         "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
         scan.face_count(),
         touch.messages.len(),
-        arguments.out.display()
+        out.display()
     ));
     Ok(Losses::new())
-}
-
-/// Stylus and camera.
-pub(super) struct TouchModel {
-    pub stylus: StylusParams,
-    /// sees the markers on the stylus
-    pub camera: Option<CameraParams>,
-    pub seed: u64,
 }
 
 /// A simulated scan and touch.
@@ -119,13 +110,14 @@ pub(super) struct Simulated {
 }
 
 /// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into `folder`; with a
-/// camera the recording also has what that saw of the markers on the stylus.
+/// camera the recording also has what that saw of the markers on the stylus. All randomness comes from the seed of `scanner`.
 pub(super) fn write_simulation(
     surface: &dyn Surface,
     truth: &TriMesh,
     path: &[Stroke],
     scanner: &ScannerParams,
-    model: &TouchModel,
+    stylus: &StylusParams,
+    camera: Option<&CameraParams>,
     folder: &Path,
 ) -> Result<Simulated, CliError> {
     create_folder(folder).map_err(not_written(folder))?;
@@ -133,16 +125,15 @@ pub(super) fn write_simulation(
     let scan = scan(surface, scanner)?;
     drop(stage);
     let _stage = WorkProgress::stage("touch");
-    let TouchModel { stylus, camera, seed } = model;
-    let touch = touch(surface, path, stylus, *seed)?;
-    let see = |camera: &CameraParams| see_markers(&touch.moments, stylus.stiffness, camera, *seed);
-    let frames = camera.as_ref().map_or_else(|| Ok(Vec::new()), see)?;
-    let topics = Topics { markers: camera.as_ref().map(|_| MARKERS_TOPIC.to_owned()), ..Topics::default() };
+    let touch = touch(surface, path, stylus, scanner.seed)?;
+    let see = |camera| see_markers(&touch.moments, stylus.stiffness, camera, scanner.seed);
+    let frames = camera.map_or_else(|| Ok(Vec::new()), see)?;
+    let topics = Topics { markers: camera.map(|_| MARKERS_TOPIC.to_owned()), ..Topics::default() };
     for (name, mesh) in [(TRUTH_NAME, truth), ("scan.ply", &scan)] {
-        write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::WriteMesh)?;
+        write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
     }
     write_recording(&folder.join("touch.mcap"), &topics, OBJECT_FRAME, STYLUS_FRAME, merged(&touch.messages, frames))
-        .map_err(CliError::WriteRecording)?;
+        .map_err(CliError::not_written)?;
     Ok(Simulated { scan, touch })
 }
 

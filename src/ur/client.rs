@@ -74,12 +74,8 @@ impl Client {
                 tracing::debug!(line, "from ur-rtde");
             }
         });
-        let (clock, hand) = if is_lock_step && !params.clock.is_manual() {
-            let (clock, hand) = Clock::manual();
-            (clock, Some(hand))
-        } else {
-            (params.clock.clone(), None)
-        };
+        let (clock, hand) = (is_lock_step && !params.clock.is_manual()).then(Clock::manual).unzip();
+        let clock = clock.unwrap_or_else(|| params.clock.clone());
         let shared = Arc::new(SharedGuard::new(params.deadlines, clock));
         let id = child.id();
         let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };

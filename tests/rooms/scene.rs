@@ -346,12 +346,12 @@ fn calibrated(yaml: &str) -> Result<String, SceneError> {
     (payload.payload.mass, payload.gravity_axes) = (0.25, GravityAxes::Space);
     compensation.bias.get_or_insert_default().force = vector![1.0, 2.0, 3.0];
     let settings = [
-        Setting::list(&["scan_to_space", "position_mm"], &[1.5, -2.0, 3.25]),
-        Setting::list(&["scan_to_space", "orientation_xyzw"], &[0.0, 0.6, 0.0, 0.8]),
-        Setting::list(&["tip", "offset_mm"], &[0.5, 0.0, -142.0]),
-        Setting::scalar(&["compensation", "payload", "mass_kg"], 0.25),
-        Setting::scalar(&["compensation", "payload", "gravity_axes"], "space"),
-        Setting::list(&["compensation", "bias", "force_n"], &[1.0, 2.0, 3.0]),
+        Setting::list("scan_to_space.position_mm", &[1.5, -2.0, 3.25]),
+        Setting::list("scan_to_space.orientation_xyzw", &[0.0, 0.6, 0.0, 0.8]),
+        Setting::list("tip.offset_mm", &[0.5, 0.0, -142.0]),
+        Setting::scalar("compensation.payload.mass_kg", 0.25),
+        Setting::scalar("compensation.payload.gravity_axes", "space"),
+        Setting::list("compensation.bias.force_n", &[1.0, 2.0, 3.0]),
     ];
     Scene::edited(yaml, &settings, "by a test", &expected)
 }

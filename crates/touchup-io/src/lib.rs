@@ -1,6 +1,43 @@
 //! Mesh files, recordings and picked points: with the scene file the only code that touches the disk.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
+/// Declares a struct of a report and how it is made, a field at a time: its name with the unit, its type, and the number that it shows.
+/// A field `name?` is left out of JSON where it is `None`, and has the type within the `Option`.
+///
+/// ```
+/// touchup_io::reported! {
+///     #[derive(PartialEq)]
+///     struct BallReport, fn of(radius: f64) {
+///         /// in the unit of people
+///         radius_mm: f64 = radius * 1e3,
+///     }
+/// }
+/// assert_eq!(BallReport::of(0.0015), BallReport { radius_mm: 1.5 });
+/// ```
+#[macro_export]
+macro_rules! reported {
+    ($(#[$meta:meta])* $vis:vis struct $Name:ident, $of:vis fn of($($from:ident: $From:ty),*) {
+        $($(#[$field_meta:meta])* $field_vis:vis $field:ident $(?: $Known:ty)? $(: $Field:ty)? = $value:expr),* $(,)?
+    }) => {
+        #[derive(Debug, serde::Serialize)]
+        $(#[$meta])*
+        $vis struct $Name {
+            $(
+                $(#[$field_meta])*
+                $(#[serde(skip_serializing_if = "Option::is_none")] $field_vis $field: Option<$Known>,)?
+                $($field_vis $field: $Field,)?
+            )*
+        }
+
+        impl $Name {
+            /// What is reported of these.
+            $of fn of($($from: $From),*) -> Self {
+                Self { $($field: $value,)* }
+            }
+        }
+    };
+}
+
 pub mod atomic;
 pub mod features_file;
 pub mod file_error;

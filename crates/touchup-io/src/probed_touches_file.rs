@@ -4,72 +4,49 @@ use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::path::Path;
 
-use serde::Serialize;
-
 use super::atomic::write_atomically;
-use touchup_core::probing::arm::TouchOutcome;
+use touchup_core::probing::arm::{Onset, TouchMoment, TouchOutcome};
 use touchup_core::probing::execute::{Probed, ProbedTouch};
 
-/// One line; lengths in mm of O, travel along the approach.
-#[derive(Debug, Serialize)]
-struct TouchLine<'a> {
-    flag: u32,
-    index: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    begun_ns: Option<i64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ended_ns: Option<i64>,
-    /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it was not made
-    verdict: &'static str,
-    accepted: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    reason: Option<&'a str>,
-    from_mm: [f64; 3],
-    approach: [f64; 3],
-    search_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    centre_mm: Option<[f64; 3]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sigma_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    deviation_mm: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    speed_mm_per_s: Option<f64>,
-    tip_radius_mm: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    largest_force_n: Option<f64>,
-    /// seconds, travel in mm, force against the approach and across it in N; going in and coming out
-    curve: Vec<[f64; 4]>,
+reported! {
+    /// One line; lengths in mm of O, travel along the approach.
+    struct TouchLine, fn of(feature: u32, number: usize, touch: &ProbedTouch, ball_radius: f64, offset_ns: i64) {
+        flag: u32 = feature,
+        index: usize = number,
+        begun_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[0] + offset_ns),
+        ended_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[1] + offset_ns),
+        /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it was not made
+        verdict: &'static str = verdict(touch),
+        accepted: bool = touch.refused.is_none(),
+        reason?: String = touch.refused.clone(),
+        from_mm: [f64; 3] = (touch.planned.from * 1e3).coords.into(),
+        approach: [f64; 3] = touch.planned.direction.into_inner().into(),
+        search_mm: f64 = touch.planned.search * 1e3,
+        centre_mm?: [f64; 3] = touch.centre.map(|centre| (centre * 1e3).coords.into()),
+        sigma_mm?: f64 = onset(touch).map(|onset| onset.sigma * 1e3),
+        deviation_mm?: f64 = touch.deviation.map(|deviation| deviation * 1e3),
+        speed_mm_per_s?: f64 = touch.record.as_ref().map(|record| record.speed * 1e3),
+        tip_radius_mm: f64 = ball_radius * 1e3,
+        largest_force_n?: f64 = touch.record.as_ref().map(|record| record.peak_force),
+        /// seconds, travel in mm, force against the approach and across it in N; going in and coming out
+        curve: Vec<[f64; 4]> = touch.record.iter().flat_map(|record| &record.curve).map(moment).collect(),
+    }
 }
 
-impl<'a> TouchLine<'a> {
-    fn of(flag: u32, index: usize, touch: &'a ProbedTouch, ball_radius: f64, offset_ns: i64) -> Self {
-        let record = touch.record.as_ref();
-        let (verdict, sigma) = record.map_or(("held_back", None), |record| match &record.outcome {
-            TouchOutcome::Contact { onset, .. } => (onset.verdict.name(), Some(onset.sigma * 1e3)),
-            TouchOutcome::Miss { .. } => ("miss", None),
-            TouchOutcome::Unclear(_) => ("unclear", None),
-        });
-        let moment = |m: &touchup_core::probing::arm::TouchMoment| [m.t, m.travel * 1e3, m.force, m.lateral];
-        Self {
-            flag,
-            index,
-            begun_ns: record.map(|record| record.stamps_ns[0] + offset_ns),
-            ended_ns: record.map(|record| record.stamps_ns[1] + offset_ns),
-            verdict,
-            accepted: touch.refused.is_none(),
-            reason: touch.refused.as_deref(),
-            from_mm: (touch.planned.from * 1e3).coords.into(),
-            approach: touch.planned.direction.into_inner().into(),
-            search_mm: touch.planned.search * 1e3,
-            centre_mm: touch.centre.map(|centre| (centre * 1e3).coords.into()),
-            sigma_mm: sigma,
-            deviation_mm: touch.deviation.map(|deviation| deviation * 1e3),
-            speed_mm_per_s: record.map(|record| record.speed * 1e3),
-            tip_radius_mm: ball_radius * 1e3,
-            largest_force_n: record.map(|record| record.peak_force),
-            curve: record.map_or(Vec::new(), |record| record.curve.iter().map(moment).collect()),
-        }
+fn moment(moment: &TouchMoment) -> [f64; 4] {
+    [moment.t, moment.travel * 1e3, moment.force, moment.lateral]
+}
+
+fn onset(touch: &ProbedTouch) -> Option<&Onset> {
+    if let TouchOutcome::Contact { onset, .. } = &touch.record.as_ref()?.outcome { Some(onset) } else { None }
+}
+
+fn verdict(touch: &ProbedTouch) -> &'static str {
+    match touch.record.as_ref().map(|record| &record.outcome) {
+        Some(TouchOutcome::Contact { onset, .. }) => onset.verdict.name(),
+        Some(TouchOutcome::Miss { .. }) => "miss",
+        Some(TouchOutcome::Unclear(_)) => "unclear",
+        None => "held_back",
     }
 }
 

@@ -1,53 +1,54 @@
 //! Numbers of eight types in binary files and messages.
 
-/// Type of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
+/// Declares the types: of each its name here, that of Rust, and those in PLY files.
+macro_rules! scalars {
+    ($($Scalar:ident: $type:ty = $($name:literal)|+;)*) => {
+        /// Type of a number.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum Scalar {
+            $($Scalar,)*
+        }
+
+        impl Scalar {
+            /// In the order in which `sensor_msgs/msg/PointField` counts them, from 1 on.
+            pub const ALL: &[Self] = &[$(Self::$Scalar),*];
+
+            /// By its name in a PLY file.
+            pub fn of_name(name: &str) -> Option<Self> {
+                match name {
+                    $($($name)|+ => Some(Self::$Scalar),)*
+                    _ => None,
+                }
+            }
+
+            /// Bytes that it takes.
+            pub fn size(self) -> usize {
+                match self {
+                    $(Self::$Scalar => size_of::<$type>(),)*
+                }
+            }
+
+            /// The number at the start of `bytes`; every type fits into `f64`.
+            #[inline]
+            pub fn value(self, bytes: &[u8], big: bool) -> Option<f64> {
+                match self {
+                    $(Self::$Scalar => {
+                        let first = *bytes.first_chunk()?;
+                        Some(f64::from(if big { <$type>::from_be_bytes(first) } else { <$type>::from_le_bytes(first) }))
+                    })*
+                }
+            }
+        }
+    };
 }
 
-impl Scalar {
-    /// In the order in which `sensor_msgs/msg/PointField` counts them, from 1 on.
-    pub const ALL: [Self; 8] = [Self::I8, Self::U8, Self::I16, Self::U16, Self::I32, Self::U32, Self::F32, Self::F64];
-
-    /// Bytes that it takes.
-    pub fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
-
-    /// The number at the start of `bytes`; every type fits into `f64`.
-    #[inline]
-    pub fn value(self, bytes: &[u8], big: bool) -> Option<f64> {
-        /// The first N bytes, least significant first.
-        #[inline]
-        fn little<const N: usize>(bytes: &[u8], big: bool) -> Option<[u8; N]> {
-            let mut first = *bytes.first_chunk::<N>()?;
-            if big {
-                first.reverse();
-            }
-            Some(first)
-        }
-        Some(match self {
-            Self::I8 => f64::from(i8::from_le_bytes(little(bytes, big)?)),
-            Self::U8 => f64::from(u8::from_le_bytes(little(bytes, big)?)),
-            Self::I16 => f64::from(i16::from_le_bytes(little(bytes, big)?)),
-            Self::U16 => f64::from(u16::from_le_bytes(little(bytes, big)?)),
-            Self::I32 => f64::from(i32::from_le_bytes(little(bytes, big)?)),
-            Self::U32 => f64::from(u32::from_le_bytes(little(bytes, big)?)),
-            Self::F32 => f64::from(f32::from_le_bytes(little(bytes, big)?)),
-            Self::F64 => f64::from_le_bytes(little(bytes, big)?),
-        })
-    }
+scalars! {
+    I8: i8 = "char" | "int8";
+    U8: u8 = "uchar" | "uint8";
+    I16: i16 = "short" | "int16";
+    U16: u16 = "ushort" | "uint16";
+    I32: i32 = "int" | "int32";
+    U32: u32 = "uint" | "uint32";
+    F32: f32 = "float" | "float32";
+    F64: f64 = "double" | "float64";
 }

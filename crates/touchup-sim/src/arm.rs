@@ -18,115 +18,74 @@ use super::surface::Surface;
 use touchup_core::probing::arm::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
 use touchup_core::stylus::{Payload, Wrench};
 
-/// The arm, how it is mounted, and what is not ideal about it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ArmParams {
-    /// Lengths.
-    pub geometry: UrGeometry,
-    /// The part in the base.
-    pub pose_bo: Isometry3<f64>,
-    /// The tip (centre of its ball, z from tip to handle) in the flange.
-    pub pose_ft: Isometry3<f64>,
-    /// True offset of the centre of its ball from there, in the axes of the tip, m.
-    pub ball_offset: Vector3<f64>,
-    /// Of the ball, m.
-    pub radius: f64,
-    /// Of arm and probe in series, N/m.
-    pub stiffness: f64,
-    /// Coefficient of friction.
-    pub friction: f64,
-    /// Position noise of the encoders, per axis, root mean square, m.
-    pub pose_noise: f64,
-    /// Of the force, per axis, root mean square, N.
-    pub force_noise: f64,
-    /// Of the torque about the flange's origin, per axis, root mean square, N·m.
-    pub torque_noise: f64,
-    /// Bias of the sensor before zeroing, N in the flange.
-    pub force_bias: Vector3<f64>,
-    /// … of the torque, N·m in the flange.
-    pub torque_bias: Vector3<f64>,
-    /// What hangs on the flange: its centre in the flange, gravity in B.
-    pub payload: Payload,
-    /// Payload that its controller compensates.
-    pub configured_payload: Payload,
-    /// From a command to the motion, s.
-    pub command_latency: f64,
-    /// How much older than its stamp the force is, s.
-    pub force_latency: f64,
-    /// Largest speed of the tip, m/s.
-    pub top_speed: f64,
-    /// Largest acceleration of the tip, m/s².
-    pub top_acceleration: f64,
-    /// Largest speed at which the tip turns, rad/s.
-    pub top_turn_speed: f64,
-    /// Largest speed of a joint, rad/s.
-    pub top_joint_speed: f64,
-    /// The arm stops by itself beyond this force, N.
-    pub safety_force: f64,
-    /// Noise comes from it.
-    pub seed: u64,
+settings! {
+    /// The arm, how it is mounted, and what is not ideal about it.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ArmParams,
+    /// A UR5e, the part on a table before it; a probe of 150 mm with a 3 mm ball, held upright.
+    default {
+        /// Lengths.
+        geometry: UrGeometry = UrGeometry::UR5E;
+        /// The part in the base.
+        pose_bo: Isometry3<f64> = Isometry3::translation(-0.4, -0.1, 0.05);
+        /// The tip (centre of its ball, z from tip to handle) in the flange.
+        pose_ft: Isometry3<f64> = Isometry3::from_parts(
+            Vector3::new(0.0, 0.0, 0.15).into(),
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        );
+        /// True offset of the centre of its ball from there, in the axes of the tip, m.
+        ball_offset: Vector3<f64> = Vector3::zeros();
+        /// Of the ball, m.
+        radius: f64 = 1.5e-3,
+            positive("the ball's radius", *radius, "m"),
+            up_to("the offset of the ball", ball_offset.norm(), "m", 0.1, "from zero to 0.1 m");
+        /// Of arm and probe in series, N/m.
+        stiffness: f64 = 15e3, positive("the stiffness of the arm", *stiffness, "N/m");
+        /// Coefficient of friction.
+        friction: f64 = 0.15, up_to("the friction", *friction, "", 10.0, "from zero to ten");
+        /// Position noise of the encoders, per axis, root mean square, m.
+        // repeatability of a UR5e is 0.03 mm; what encoders add to one reading is less
+        pose_noise: f64 = 10e-6, up_to("the pose noise", *pose_noise, "m", 1.0, "from zero to 1 m");
+        /// Of the force, per axis, root mean square, N.
+        force_noise: f64 = 0.15, up_to("the force noise", *force_noise, "N", 1e3, "from zero to 1 kN");
+        /// Of the torque about the flange's origin, per axis, root mean square, N·m.
+        torque_noise: f64 = 5e-3, up_to("the torque noise", *torque_noise, "N·m", 100.0, "from zero to 100 N·m");
+        /// Bias of the sensor before zeroing, N in the flange.
+        force_bias: Vector3<f64> = Vector3::new(0.4, -0.3, 1.1), not_negative("the bias of the force", force_bias.norm(), "N");
+        /// … of the torque, N·m in the flange.
+        torque_bias: Vector3<f64> = Vector3::new(0.05, -0.08, 0.02),
+            not_negative("the bias of the torque", torque_bias.norm(), "N·m");
+        /// What hangs on the flange: its centre in the flange, gravity in B.
+        payload: Payload = WEIGHTLESS, check_payload(payload);
+        /// Payload that its controller compensates.
+        configured_payload: Payload = WEIGHTLESS, check_payload(configured_payload);
+        /// From a command to the motion, s.
+        command_latency: f64 = 6e-3, up_to("the latency of commands", *command_latency, "s", 1.0, "from zero to 1 s");
+        /// How much older than its stamp the force is, s.
+        force_latency: f64 = 4e-3, up_to("the latency of the force", *force_latency, "s", 1.0, "from zero to 1 s");
+        /// Largest speed of the tip, m/s.
+        top_speed: f64 = 0.5, positive("the largest speed", *top_speed, "m/s");
+        /// Largest acceleration of the tip, m/s².
+        top_acceleration: f64 = 2.0, positive("the largest acceleration", *top_acceleration, "m/s²");
+        /// Largest speed at which the tip turns, rad/s.
+        top_turn_speed: f64 = 0.5, positive("the largest speed of a turn", *top_turn_speed, "rad/s");
+        /// Largest speed of a joint, rad/s.
+        top_joint_speed: f64 = 3.1, positive("the largest speed of a joint", *top_joint_speed, "rad/s");
+        /// The arm stops by itself beyond this force, N.
+        safety_force: f64 = 150.0, positive("the safety force", *safety_force, "N");
+        /// Noise comes from it.
+        seed: u64 = 1;
+    }
 }
 
 /// Nothing hangs on the flange; the base is upright.
 pub const WEIGHTLESS: Payload =
     Payload { mass: 0.0, p_sc: Vector3::new(0.0, 0.0, 0.0), gravity_o: Vector3::new(0.0, 0.0, -9.81) };
 
-impl Default for ArmParams {
-    /// A UR5e, the part on a table before it; a probe of 150 mm with a 3 mm ball, held upright.
-    fn default() -> Self {
-        let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        Self {
-            geometry: UrGeometry::UR5E,
-            pose_bo: Isometry3::translation(-0.4, -0.1, 0.05),
-            pose_ft: Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.15).into(), upright),
-            ball_offset: Vector3::zeros(),
-            radius: 1.5e-3,
-            stiffness: 15e3,
-            friction: 0.15,
-            // repeatability of a UR5e is 0.03 mm; what encoders add to one reading is less
-            pose_noise: 10e-6,
-            force_noise: 0.15,
-            torque_noise: 5e-3,
-            force_bias: Vector3::new(0.4, -0.3, 1.1),
-            torque_bias: Vector3::new(0.05, -0.08, 0.02),
-            payload: WEIGHTLESS,
-            configured_payload: WEIGHTLESS,
-            command_latency: 6e-3,
-            force_latency: 4e-3,
-            top_speed: 0.5,
-            top_acceleration: 2.0,
-            top_turn_speed: 0.5,
-            top_joint_speed: 3.1,
-            safety_force: 150.0,
-            seed: 1,
-        }
-    }
-}
-
-impl ArmParams {
-    fn check(&self) -> Result<(), SimError> {
-        positive("the ball's radius", self.radius, "m")?;
-        up_to("the offset of the ball", self.ball_offset.norm(), "m", 0.1, "from zero to 0.1 m")?;
-        positive("the stiffness of the arm", self.stiffness, "N/m")?;
-        up_to("the friction", self.friction, "", 10.0, "from zero to ten")?;
-        up_to("the pose noise", self.pose_noise, "m", 1.0, "from zero to 1 m")?;
-        up_to("the force noise", self.force_noise, "N", 1e3, "from zero to 1 kN")?;
-        up_to("the torque noise", self.torque_noise, "N·m", 100.0, "from zero to 100 N·m")?;
-        not_negative("the bias of the force", self.force_bias.norm(), "N")?;
-        not_negative("the bias of the torque", self.torque_bias.norm(), "N·m")?;
-        for payload in [&self.payload, &self.configured_payload] {
-            up_to("the payload", payload.mass, "kg", 100.0, "from zero to 100 kg")?;
-            not_negative("the distance of the payload's centre", payload.p_sc.norm(), "m")?;
-            not_negative("gravity", payload.gravity_o.norm(), "m/s²")?;
-        }
-        up_to("the latency of commands", self.command_latency, "s", 1.0, "from zero to 1 s")?;
-        up_to("the latency of the force", self.force_latency, "s", 1.0, "from zero to 1 s")?;
-        positive("the largest speed", self.top_speed, "m/s")?;
-        positive("the largest acceleration", self.top_acceleration, "m/s²")?;
-        positive("the largest speed of a turn", self.top_turn_speed, "rad/s")?;
-        positive("the largest speed of a joint", self.top_joint_speed, "rad/s")?;
-        positive("the safety force", self.safety_force, "N")
-    }
+fn check_payload(payload: &Payload) -> Result<(), SimError> {
+    up_to("the payload", payload.mass, "kg", 100.0, "from zero to 100 kg")?;
+    not_negative("the distance of the payload's centre", payload.p_sc.norm(), "m")?;
+    not_negative("gravity", payload.gravity_o.norm(), "m/s²")
 }
 
 /// An injected fault.

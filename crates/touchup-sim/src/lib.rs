@@ -4,6 +4,9 @@
 //! over it and records its contacts ([`touch`]). All randomness comes from a seed.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
+#[macro_use]
+mod settings;
+
 mod arm;
 mod ball;
 mod contour;

@@ -9,52 +9,30 @@ use super::random::{gauss_vector, uniform};
 use super::sensor::{Moment, TICK};
 use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
-/// The camera and how badly it sees.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CameraParams {
-    /// Markers on the stylus.
-    pub body: MarkerBody,
-    /// Frames per second, at most 1000.
-    pub rate: f64,
-    /// Root mean square per axis, m.
-    pub noise: f64,
-    /// Share of the time that a marker is hidden, for 0.05 to 0.3 s each time.
-    pub hidden: f64,
-    /// Times per second that all markers are hidden, for 0.01 to 0.1 s.
-    pub blackout_rate: f64,
-    /// Times per second that two labels are swapped, for 0.05 to 0.3 s.
-    pub swap_rate: f64,
-    /// Share of the seen markers that are a reflection 1 to 50 mm away.
-    pub outliers: f64,
-    /// Stamp of the first moment, ns.
-    pub start_ns: i64,
-}
-
-impl Default for CameraParams {
+settings! {
+    /// The camera and how badly it sees.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct CameraParams,
     /// An active LED system at 2 m.
-    fn default() -> Self {
-        Self {
-            body: MarkerBody::default(),
-            rate: 250.0,
-            noise: 0.05e-3,
-            hidden: 0.15,
-            blackout_rate: 0.2,
-            swap_rate: 0.1,
-            outliers: 0.005,
-            start_ns: super::SensorParams::default().start_ns,
-        }
-    }
-}
-
-impl CameraParams {
-    fn check(&self) -> Result<(), SimError> {
-        positive("the rate of the camera", self.rate, "1/s")?;
-        up_to("the rate of the camera", self.rate, "1/s", 1.0 / TICK, "1000 1/s or less")?;
-        up_to("the noise of the markers", self.noise, "m", 1.0, "from zero to 1 m")?;
-        up_to("the share of hidden markers", self.hidden, "", 0.9, "from zero to 0.9")?;
-        up_to("the rate of blackouts", self.blackout_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s")?;
-        up_to("the rate of swaps", self.swap_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s")?;
-        up_to("the share of outliers", self.outliers, "", 1.0, "from zero to one")
+    default {
+        /// Markers on the stylus.
+        body: MarkerBody = MarkerBody::default();
+        /// Frames per second, at most 1000.
+        rate: f64 = 250.0,
+            positive("the rate of the camera", *rate, "1/s"),
+            up_to("the rate of the camera", *rate, "1/s", 1.0 / TICK, "1000 1/s or less");
+        /// Root mean square per axis, m.
+        noise: f64 = 0.05e-3, up_to("the noise of the markers", *noise, "m", 1.0, "from zero to 1 m");
+        /// Share of the time that a marker is hidden, for 0.05 to 0.3 s each time.
+        hidden: f64 = 0.15, up_to("the share of hidden markers", *hidden, "", 0.9, "from zero to 0.9");
+        /// Times per second that all markers are hidden, for 0.01 to 0.1 s.
+        blackout_rate: f64 = 0.2, up_to("the rate of blackouts", *blackout_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s");
+        /// Times per second that two labels are swapped, for 0.05 to 0.3 s.
+        swap_rate: f64 = 0.1, up_to("the rate of swaps", *swap_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s");
+        /// Share of the seen markers that are a reflection 1 to 50 mm away.
+        outliers: f64 = 0.005, up_to("the share of outliers", *outliers, "", 1.0, "from zero to one");
+        /// Stamp of the first moment, ns.
+        start_ns: i64 = super::SensorParams::default().start_ns;
     }
 }
 

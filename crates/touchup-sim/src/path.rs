@@ -43,27 +43,24 @@ pub enum Lines {
     AlongY,
 }
 
-/// How fast and how densely the hand works.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathParams {
-    /// Ball radius, m.
-    pub radius: f64,
-    /// Distance between the lines of a raster, m.
-    pub pitch: f64,
-    /// Speed along rasters, m/s.
-    pub speed: f64,
-    /// Speed along walls, m/s.
-    pub wall_speed: f64,
-    /// Distance of the guide beyond the wall along which it runs, m.
-    pub lean: f64,
-    /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
-    pub longest: f64,
-}
-
-impl Default for PathParams {
+settings! {
+    /// How fast and how densely the hand works.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PathParams,
     /// A hand with a 1.5 mm ball: lines closer than the ball is wide, as fast as people rub a surface.
-    fn default() -> Self {
-        Self { radius: 1.5e-3, pitch: 2e-3, speed: 0.04, wall_speed: 0.025, lean: 0.4e-3, longest: 90.0 }
+    default {
+        /// Ball radius, m.
+        radius: f64 = 1.5e-3, positive("the ball's radius", *radius, "m");
+        /// Distance between the lines of a raster, m.
+        pitch: f64 = 2e-3, positive("the distance of the lines", *pitch, "m");
+        /// Speed along rasters, m/s.
+        speed: f64 = 0.04, positive("the speed along rasters", *speed, "m/s");
+        /// Speed along walls, m/s.
+        wall_speed: f64 = 0.025, positive("the speed along walls", *wall_speed, "m/s");
+        /// Distance of the guide beyond the wall along which it runs, m.
+        lean: f64 = 0.4e-3, not_negative("the size of the lean", lean.abs(), "m");
+        /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
+        longest: f64 = 90.0, positive("the longest time", *longest, "s");
     }
 }
 
@@ -84,24 +81,9 @@ const TOUCHING: f64 = 10e-6;
 /// Longest chord of a run along a curved wall, m.
 const CHORD: f64 = 0.2e-3;
 
-impl PathParams {
-    fn check(&self) -> Result<(), SimError> {
-        positive("the ball's radius", self.radius, "m")?;
-        positive("the distance of the lines", self.pitch, "m")?;
-        positive("the speed along rasters", self.speed, "m/s")?;
-        positive("the speed along walls", self.wall_speed, "m/s")?;
-        not_negative("the size of the lean", self.lean.abs(), "m")?;
-        positive("the longest time", self.longest, "s")
-    }
-}
-
 impl RasterRegion {
     fn at(&self, q: Point2<f64>, z: f64) -> Point3<f64> {
         self.frame_ov * Point3::new(q.x, q.y, z)
-    }
-
-    fn press(&self) -> Option<Unit<Vector3<f64>>> {
-        Some(Unit::new_unchecked(self.frame_ov * -Vector3::z()))
     }
 }
 
@@ -130,9 +112,10 @@ pub fn raster(region: &RasterRegion, lines: Lines, params: &PathParams) -> Resul
     let track: Vec<_> = (0..=count).flat_map(|i| [corner(i, i % 2 == 1), corner(i, i % 2 == 0)]).collect();
     let (first, last) = (track[0], track[track.len() - 1]);
     let points = track.into_iter().map(|q| region.at(q, region.floor)).collect();
+    let press = Some(Unit::new_unchecked(region.frame_ov * -Vector3::z()));
     Ok(vec![
         free(vec![region.at(first, region.clear)]),
-        Stroke { points, speed: params.speed, press: region.press() },
+        Stroke { points, speed: params.speed, press },
         // straight up first
         free(vec![region.at(last, region.clear)]),
     ])

@@ -18,52 +18,39 @@ use super::surface::Surface;
 use touchup_core::mesh::TriMesh;
 use touchup_core::numeric::weighted_quantile;
 
-/// How bad the scanner is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScannerParams {
-    /// Median length of the triangles' edges, m.
-    pub edge: f64,
-    /// Noise along the normals, root mean square, m.
-    pub noise: f64,
-    /// Distance over which the noise stays alike, m.
-    pub noise_correlation: f64,
-    /// Share of the noise's power that is independent from vertex to vertex.
-    pub white_share: f64,
-    /// Surface offset: the part looks larger by this on all sides, m.
-    pub bias: f64,
-    /// Standard deviation of the blur that rounds the edges, m.
-    pub rounding: f64,
-    /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
-    pub closes_holes_below: f64,
-    /// Translation of the rigid offset of the scan, m.
-    pub rigid_shift: f64,
-    /// And by which angle, rad.
-    pub rigid_turn: f64,
-    /// Direction in which the scanner looks, in O.
-    pub view: Unit<Vector3<f64>>,
-    /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
-    pub open_back: bool,
-    /// Of all randomness.
-    pub seed: u64,
-}
-
-impl Default for ScannerParams {
+settings! {
+    /// How bad the scanner is.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ScannerParams,
     /// A hand-held structured-light scanner of the cheaper kind, looking down.
-    fn default() -> Self {
-        Self {
-            edge: 2.4e-3,
-            noise: 0.6e-3,
-            noise_correlation: 3.5e-3,
-            white_share: 0.02,
-            bias: 0.3e-3,
-            rounding: 0.8e-3,
-            closes_holes_below: 11e-3,
-            rigid_shift: 0.2e-3,
-            rigid_turn: 0.15f64.to_radians(),
-            view: -Vector3::z_axis(),
-            open_back: true,
-            seed: 1,
-        }
+    default {
+        /// Median length of the triangles' edges, m.
+        edge: f64 = 2.4e-3, positive("the scan's edge length", *edge, "m");
+        /// Noise along the normals, root mean square, m.
+        noise: f64 = 0.6e-3, not_negative("the scan's noise", *noise, "m");
+        /// Distance over which the noise stays alike, m.
+        noise_correlation: f64 = 3.5e-3, positive("the correlation length of the noise", *noise_correlation, "m");
+        /// Share of the noise's power that is independent from vertex to vertex.
+        white_share: f64 = 0.02,
+            not_negative("the white share of the noise", *white_share, ""),
+            not_negative("the coloured share of the noise", 1.0 - white_share, "");
+        /// Surface offset: the part looks larger by this on all sides, m.
+        bias: f64 = 0.3e-3;
+        /// Standard deviation of the blur that rounds the edges, m.
+        rounding: f64 = 0.8e-3, not_negative("the rounding", *rounding, "m");
+        /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
+        closes_holes_below: f64 = 11e-3, not_negative("the width of closed holes", *closes_holes_below, "m");
+        /// Translation of the rigid offset of the scan, m.
+        rigid_shift: f64 = 0.2e-3, not_negative("the rigid shift", *rigid_shift, "m");
+        /// And by which angle, rad.
+        rigid_turn: f64 = 0.15f64.to_radians(),
+            not_negative("the rigid turn", *rigid_turn, "rad"), not_negative("the size of the bias", bias.abs(), "m");
+        /// Direction in which the scanner looks, in O.
+        view: Unit<Vector3<f64>> = -Vector3::z_axis();
+        /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
+        open_back: bool = true;
+        /// Of all randomness.
+        seed: u64 = 1;
     }
 }
 
@@ -91,19 +78,6 @@ const REPAIRS: usize = 2;
 const LONGEST_FILLED: usize = 20;
 
 impl ScannerParams {
-    fn check(&self) -> Result<(), SimError> {
-        positive("the scan's edge length", self.edge, "m")?;
-        not_negative("the scan's noise", self.noise, "m")?;
-        positive("the correlation length of the noise", self.noise_correlation, "m")?;
-        not_negative("the white share of the noise", self.white_share, "")?;
-        not_negative("the coloured share of the noise", 1.0 - self.white_share, "")?;
-        not_negative("the rounding", self.rounding, "m")?;
-        not_negative("the width of closed holes", self.closes_holes_below, "m")?;
-        not_negative("the rigid shift", self.rigid_shift, "m")?;
-        not_negative("the rigid turn", self.rigid_turn, "rad")?;
-        not_negative("the size of the bias", self.bias.abs(), "m")
-    }
-
     /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise and the gradient stay within.
     fn band(&self) -> f64 {
         3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
@@ -137,17 +111,14 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     soup.tidy_mut();
     soup.drop_unused_mut();
     if soup.faces.is_empty() {
-        return Err(why_empty(surface, params.edge));
+        // what to change
+        let (size_m, edge_m) = (surface.bounds().size().max(), params.edge);
+        let is_coarse = edge_m > COARSE * size_m;
+        return Err(if is_coarse { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen });
     }
     let slip_v = slip(params, &mut rng);
     soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * *p));
     Ok(TriMesh::new(soup.positions, soup.faces)?)
-}
-
-/// What to change where a scan has no face.
-fn why_empty(surface: &dyn Surface, edge_m: f64) -> SimError {
-    let size_m = surface.bounds().size().max();
-    if edge_m > COARSE * size_m { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen }
 }
 
 /// Fills in for what is not a clean surface.

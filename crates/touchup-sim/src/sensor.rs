@@ -8,7 +8,7 @@ use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
-use super::error::{SimError, not_negative, require, up_to};
+use super::error::{not_negative, require, up_to};
 use super::random::{Drift, gauss, gauss_vector, uniform};
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
@@ -25,49 +25,37 @@ pub struct Moment {
     pub contacts: Vec<BallContact>,
 }
 
-/// Errors of sensors and transport. All noise is root mean square.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SensorParams {
-    /// Per axis, m.
-    pub pose_noise: f64,
-    /// Per axis, rad.
-    pub orientation_noise: f64,
-    /// Per axis, N.
-    pub force_noise: f64,
-    /// Per axis, N·m.
-    pub torque_noise: f64,
-    /// Slowly drifting, per axis, N.
-    pub force_bias: f64,
-    /// How much later the wrench's clock reads than the pose's, s.
-    pub wrench_clock: f64,
-    /// Of the pose's stamps, s; those of the wrench have half of it.
-    pub jitter: f64,
-    /// Share of messages that never arrive.
-    pub lost: f64,
-    /// Share of messages that arrive 5 to 15 ms late, after later ones.
-    pub late: f64,
-    /// Times per second that a topic falls silent for 5 to 60 ms.
-    pub gap_rate: f64,
-    /// Stamp of the first moment on the pose's clock, ns.
-    pub start_ns: i64,
-}
-
-impl Default for SensorParams {
+settings! {
+    /// Errors of sensors and transport. All noise is root mean square.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SensorParams,
     /// Optical tracking and a small six-axis cell on a busy network.
-    fn default() -> Self {
-        Self {
-            pose_noise: 0.05e-3,
-            orientation_noise: 0.1f64.to_radians(),
-            force_noise: 0.05,
-            torque_noise: 1e-3,
-            force_bias: 0.05,
-            wrench_clock: 1.8e-3,
-            jitter: 0.1e-3,
-            lost: 0.005,
-            late: 0.006,
-            gap_rate: 0.1,
-            start_ns: 1_700_000_000_000_000_000,
-        }
+    default {
+        /// Per axis, m.
+        pose_noise: f64 = 0.05e-3, up_to("the pose noise", *pose_noise, "m", 1.0, "from zero to 1 m");
+        /// Per axis, rad.
+        orientation_noise: f64 = 0.1f64.to_radians(),
+            up_to("the orientation noise", *orientation_noise, "rad", PI, "from zero to half a turn");
+        /// Per axis, N.
+        force_noise: f64 = 0.05, up_to("the force noise", *force_noise, "N", 1e3, "from zero to 1 kN");
+        /// Per axis, N·m.
+        torque_noise: f64 = 1e-3, up_to("the torque noise", *torque_noise, "N m", 1e3, "from zero to 1 kN m");
+        /// Slowly drifting, per axis, N.
+        force_bias: f64 = 0.05, up_to("the force bias", *force_bias, "N", 1e3, "from zero to 1 kN");
+        /// How much later the wrench's clock reads than the pose's, s.
+        wrench_clock: f64 = 1.8e-3;
+        /// Of the pose's stamps, s; those of the wrench have half of it.
+        jitter: f64 = 0.1e-3, not_negative("the jitter", *jitter, "s");
+        /// Share of messages that never arrive.
+        lost: f64 = 0.005, up_to("the share of lost messages", *lost, "", 1.0, "from zero to one");
+        /// Share of messages that arrive 5 to 15 ms late, after later ones.
+        late: f64 = 0.006, up_to("the share of late messages", *late, "", 1.0, "from zero to one");
+        /// Times per second that a topic falls silent for 5 to 60 ms.
+        gap_rate: f64 = 0.1,
+            not_negative("the rate of gaps", *gap_rate, "1/s"),
+            require(wrench_clock.abs() <= LARGEST_CLOCK, "the wrench clock's offset", *wrench_clock, "s", "within one second");
+        /// Stamp of the first moment on the pose's clock, ns.
+        start_ns: i64 = 1_700_000_000_000_000_000;
     }
 }
 
@@ -87,20 +75,6 @@ impl SensorParams {
             gap_rate: 0.0,
             ..Self::default()
         }
-    }
-
-    pub(super) fn check(&self) -> Result<(), SimError> {
-        up_to("the pose noise", self.pose_noise, "m", 1.0, "from zero to 1 m")?;
-        up_to("the orientation noise", self.orientation_noise, "rad", PI, "from zero to half a turn")?;
-        up_to("the force noise", self.force_noise, "N", 1e3, "from zero to 1 kN")?;
-        up_to("the torque noise", self.torque_noise, "N m", 1e3, "from zero to 1 kN m")?;
-        up_to("the force bias", self.force_bias, "N", 1e3, "from zero to 1 kN")?;
-        not_negative("the jitter", self.jitter, "s")?;
-        up_to("the share of lost messages", self.lost, "", 1.0, "from zero to one")?;
-        up_to("the share of late messages", self.late, "", 1.0, "from zero to one")?;
-        not_negative("the rate of gaps", self.gap_rate, "1/s")?;
-        let is_allowed = self.wrench_clock.abs() <= LARGEST_CLOCK;
-        require(is_allowed, "the wrench clock's offset", self.wrench_clock, "s", "within one second")
     }
 }
 

@@ -19,65 +19,41 @@ use super::tip::SimTip;
 use touchup_core::numeric::turned_to;
 use touchup_core::stylus::{Message, TipShape};
 
-/// The stylus and the hand that leads it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StylusParams {
-    /// Radius of the ball, of the flat end, or of the nose of the cone, m.
-    pub radius: f64,
-    /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05 mm.
-    pub shape: TipShape,
-    /// Stiffness of the tip, N/m.
-    pub stiffness: f64,
-    /// Coefficient of friction.
-    pub friction: f64,
-    /// How hard the hand presses on average, N.
-    pub force: f64,
-    /// How much that varies, root mean square, N.
-    pub force_variation: f64,
-    /// The hand presses no less and no more than this, N.
-    pub force_range: [f64; 2],
-    /// Root mean square of the shaft's tilt about each of two axes, rad.
-    pub tilt: f64,
-    /// Root mean square deviation of the hand from its line, per axis, m.
-    pub stray: f64,
-    /// Errors of sensors and transport.
-    pub sensor: SensorParams,
-}
-
-impl Default for StylusParams {
+settings! {
+    /// The stylus and the hand that leads it.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct StylusParams,
     /// A light aluminium stylus with a 3 mm ball on dry steel, led by a calm hand.
-    fn default() -> Self {
-        Self {
-            radius: 1.5e-3,
-            shape: TipShape::Ball,
-            stiffness: 20e3,
-            friction: 0.15,
-            force: 2.5,
-            force_variation: 0.5,
-            force_range: [1.0, 4.0],
-            tilt: 5f64.to_radians(),
-            stray: 0.15e-3,
-            sensor: SensorParams::default(),
-        }
+    default {
+        /// Radius of the ball, of the flat end, or of the nose of the cone, m.
+        radius: f64 = 1.5e-3,
+            positive("the ball's radius", *radius, "m"), up_to("the ball's radius", *radius, "m", 1.0, "1 m or less");
+        /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05 mm.
+        shape: TipShape = TipShape::Ball;
+        /// Stiffness of the tip, N/m.
+        stiffness: f64 = 20e3, positive("the tip's stiffness", *stiffness, "N/m");
+        /// Coefficient of friction.
+        friction: f64 = 0.15, up_to("the friction", *friction, "", 10.0, "from zero to ten");
+        /// How hard the hand presses on average, N.
+        force: f64 = 2.5, up_to("the hand's force", *force, "N", LARGEST_FORCE, "from zero to 1 kN");
+        /// How much that varies, root mean square, N.
+        force_variation: f64 = 0.5,
+            up_to("the variation of force", *force_variation, "N", LARGEST_FORCE, "from zero to 1 kN");
+        /// The hand presses no less and no more than this, N.
+        force_range: [f64; 2] = [1.0, 4.0], check_range(*force_range, *stiffness);
+        /// Root mean square of the shaft's tilt about each of two axes, rad.
+        tilt: f64 = 5f64.to_radians(), up_to("the tilt", *tilt, "rad", std::f64::consts::PI, "from zero to half a turn");
+        /// Root mean square deviation of the hand from its line, per axis, m.
+        stray: f64 = 0.15e-3, up_to("the straying of the hand", *stray, "m", 1.0, "from zero to 1 m");
+        /// Errors of sensors and transport.
+        sensor: SensorParams = SensorParams::default(), sensor.check();
     }
 }
 
-impl StylusParams {
-    fn check(&self) -> Result<(), SimError> {
-        let [least, most] = self.force_range;
-        positive("the ball's radius", self.radius, "m")?;
-        up_to("the ball's radius", self.radius, "m", 1.0, "1 m or less")?;
-        positive("the tip's stiffness", self.stiffness, "N/m")?;
-        up_to("the friction", self.friction, "", 10.0, "from zero to ten")?;
-        up_to("the hand's force", self.force, "N", LARGEST_FORCE, "from zero to 1 kN")?;
-        up_to("the variation of force", self.force_variation, "N", LARGEST_FORCE, "from zero to 1 kN")?;
-        up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
-        up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
-        up_to("the bending of the tip", most / self.stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")?;
-        up_to("the tilt", self.tilt, "rad", std::f64::consts::PI, "from zero to half a turn")?;
-        up_to("the straying of the hand", self.stray, "m", 1.0, "from zero to 1 m")?;
-        self.sensor.check()
-    }
+fn check_range([least, most]: [f64; 2], stiffness: f64) -> Result<(), SimError> {
+    up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
+    up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
+    up_to("the bending of the tip", most / stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")
 }
 
 /// A simulated recording with the truth behind it.

@@ -2,19 +2,17 @@
 
 mod number;
 mod payload;
-mod payload_by_arm;
 mod recording;
 mod scan;
 mod stiffness;
 mod target;
 mod tip;
-mod tip_by_arm;
 
 use clap::Subcommand;
 
 use self::number::{Vector, rounded};
 use self::recording::CalibrationRecording;
-use self::target::{CalibrationTarget, Change, DraftScene};
+use self::target::{Calibrated, CalibrationTarget, DraftScene};
 use super::{CliError, Losses};
 
 #[derive(Debug, Subcommand)]
@@ -33,14 +31,8 @@ pub(super) enum CalibrateArguments {
 pub(super) fn calibrate(arguments: &CalibrateArguments) -> Result<Losses, CliError> {
     match arguments {
         CalibrateArguments::Scan(arguments) => scan::scan(arguments),
-        CalibrateArguments::Payload(arguments) => match arguments.robot {
-            Some(robot) => payload_by_arm::payload(arguments, robot),
-            None => payload::payload(arguments),
-        },
-        CalibrateArguments::Tip(arguments) => match (arguments.robot, &arguments.spot) {
-            (Some(robot), Some(spot)) => tip_by_arm::tip(arguments, robot, spot),
-            _ => tip::tip(arguments),
-        },
+        CalibrateArguments::Payload(arguments) => payload::payload(arguments),
+        CalibrateArguments::Tip(arguments) => tip::tip(arguments),
         CalibrateArguments::Stiffness(arguments) => stiffness::stiffness(arguments),
     }
 }

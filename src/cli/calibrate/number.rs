@@ -2,21 +2,15 @@
 
 use std::fmt::{self, Display};
 
-use serde::Serialize;
-
 use crate::calibrate::VectorEstimate;
+use crate::cli::reported;
 
-/// A value of three components as JSON has it, and its standard uncertainty.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Vector {
-    pub value: [f64; 3],
-    std: [f64; 3],
-}
-
-impl Vector {
-    /// - `unit`: how many of the unit are one of SI.
-    pub fn of(known: &VectorEstimate, unit: f64) -> Self {
-        Self { value: (known.value * unit).into(), std: (known.sigma * unit).into() }
+reported! {
+    /// A value of three components as JSON has it, and its standard uncertainty; `unit`: how many of it are one of SI.
+    #[derive(Clone, Copy)]
+    pub(super) struct Vector, pub fn of(known: &VectorEstimate, unit: f64) {
+        pub value: [f64; 3] = (known.value * unit).into(),
+        std: [f64; 3] = (known.sigma * unit).into(),
     }
 }
 

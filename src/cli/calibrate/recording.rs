@@ -29,7 +29,7 @@ impl CalibrationRecording {
     pub fn open(&self, bag: &Path) -> Result<Recording, CliError> {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        Recording::open(bag, &topics).map_err(CliError::ReadRecording)
+        Ok(Recording::open(bag, &topics)?)
     }
 
     /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
@@ -38,7 +38,6 @@ impl CalibrationRecording {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        let mut at_each = || progress.step();
-        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut at_each, each)?)
+        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut || progress.step(), each)?)
     }
 }

@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nalgebra::{Isometry3, Vector3, Vector6};
-use serde::Serialize;
 use tracing::warn;
 
-use super::super::{CliError, Losses, check_kept, reported};
-use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, rounded};
+use super::super::{CliError, Losses, check_kept, reported, require};
+use super::{Calibrated, CalibrationRecording, CalibrationTarget, DraftScene, rounded};
 use crate::align::{PairsFit, PairsParams, PointPair, fit_pairs};
 use crate::calibrate::{DwellFinder, DwellParams};
 use crate::io::pairs_file::{PairsFile, read_pairs, read_scan_points};
@@ -38,8 +37,8 @@ pub(in crate::cli) struct ScanArguments {
 /// The verb.
 pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
     let ScanArguments { pairs: path, bag, sigma_mm, target, .. } = arguments;
-    if let Some(sigma) = sigma_mm.filter(|sigma| !(1e-6..=1e3).contains(sigma)) {
-        return Err(CliError::Usage(format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm")));
+    if let Some(sigma) = sigma_mm {
+        require((1e-6..=1e3).contains(sigma), format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm"))?;
     }
     let draft = target.open("--pairs", path)?;
     let (PairsFile { pairs, names }, losses) = match bag {
@@ -50,7 +49,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
     let fit = fit_pairs(&pairs, &params).map_err(|error| CliError::calibration(path, error))?;
     warn_of_gravity(&draft.scene);
     let found = ScanFound::of(&pairs, &names, &fit);
-    target.write(&draft, &found.change(&draft), &found)?;
+    target.write(&draft, &found)?;
     Ok(losses)
 }
 
@@ -104,7 +103,6 @@ fn warn_of_gravity(scene: &Scene) {
 
 reported! {
     /// What `--json` prints.
-    #[derive(Debug, Serialize)]
     struct ScanFound, fn of(picked: &[PointPair], names: &[String], fit: &PairsFit) {
         pairs: Vec<PairFound> = names.iter().zip(picked).zip(&fit.residuals).map(PairFound::of).collect(),
         rms_mm: f64 = fit.rms * 1e3,
@@ -125,7 +123,6 @@ fn sigma(fit: &PairsFit) -> Vector6<f64> {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct PairFound, fn of(found: ((&String, &PointPair), &Vector3<f64>)) {
         name: String = found.0.0.clone(),
         scan_mm: [f64; 3] = (found.0.1.from.coords * 1e3).into(),
@@ -135,25 +132,23 @@ reported! {
 }
 
 reported! {
-    #[derive(Clone, Copy, Debug, Serialize)]
+    #[derive(Clone, Copy)]
     struct ScanMotion, fn of(motion: &Isometry3<f64>) {
         position_mm: [f64; 3] = motion.translation.vector.map(|x| rounded(x * 1e3, 7)).into(),
         orientation_xyzw: [f64; 4] = motion.rotation.coords.map(|c| rounded(c, 12)).into(),
     }
 }
 
-impl ScanFound {
-    fn change(&self, draft: &DraftScene) -> Change {
+impl Calibrated for ScanFound {
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let ScanMotion { position_mm, orientation_xyzw } = self.scan_to_space;
-        let section = ScanToSpaceSection { position: Vector3::from(position_mm) / 1e3, orientation_xyzw };
-        Change {
-            settings: vec![
-                Setting::list(&["scan_to_space", "position_mm"], &position_mm),
-                Setting::list(&["scan_to_space", "orientation_xyzw"], &orientation_xyzw),
-            ],
-            remark: format!("scan: {} pairs, residuals {:.3} mm rms", self.pairs.len(), self.rms_mm),
-            expected: Scene { scan_to_space: Some(section), ..draft.scene.clone() },
-        }
+        let position = Vector3::from(position_mm) / 1e3;
+        scene.scan_to_space = Some(ScanToSpaceSection { position, orientation_xyzw });
+        let settings = vec![
+            Setting::list("scan_to_space.position_mm", &position_mm),
+            Setting::list("scan_to_space.orientation_xyzw", &orientation_xyzw),
+        ];
+        (settings, format!("scan: {} pairs, residuals {:.3} mm rms", self.pairs.len(), self.rms_mm))
     }
 }
 

@@ -3,14 +3,13 @@
 use std::fmt;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::super::arm::ArmArguments;
 use super::super::check::repeated;
 use super::super::{CliError, Losses, reported};
-use super::{CalibrationTarget, Change, rounded};
+use super::{Calibrated, CalibrationTarget, rounded};
 use crate::probing::execute::Repeatability;
-use crate::scene::Setting;
+use crate::scene::{Scene, Setting};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct StiffnessArguments {
@@ -30,28 +29,27 @@ pub(in crate::cli) struct StiffnessArguments {
 pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
     let StiffnessArguments { arm, spot, touches, target } = arguments;
     let (scene, draft) = target.open_for_arm()?;
-    let found = StiffnessFound::of(&repeated(arm, scene, spot, *touches)?);
-    let stiffness_n_per_mm = rounded(found.stiffness_n_per_mm, 3);
-    let mut expected = draft.scene.clone();
-    expected.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);
-    let change = Change {
-        settings: vec![Setting::scalar(&["tip", "stiffness_n_per_mm"], stiffness_n_per_mm)],
-        remark: format!("stiffness: {} presses, ± {:.3} N/mm", found.touches, found.std_n_per_mm),
-        expected,
-    };
-    target.write(&draft, &change, &found)?;
+    target.write(&draft, &StiffnessFound::of(&repeated(arm, scene, spot, *touches)?))?;
     Ok(Losses::new())
 }
 
 reported! {
     /// What `--json` prints.
-    #[derive(Debug, Serialize)]
     struct StiffnessFound, fn of(found: &Repeatability) {
         touches: usize = found.touches.len(),
         stiffness_n_per_mm: f64 = found.stiffness()[0] / 1e3,
         std_n_per_mm: f64 = found.stiffness()[1] / 1e3,
         /// of the places where the spot was touched
         range_um: f64 = found.range() * 1e6,
+    }
+}
+
+impl Calibrated for StiffnessFound {
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+        let stiffness_n_per_mm = rounded(self.stiffness_n_per_mm, 3);
+        scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);
+        let remark = format!("stiffness: {} presses, ± {:.3} N/mm", self.touches, self.std_n_per_mm);
+        (vec![Setting::scalar("tip.stiffness_n_per_mm", stiffness_n_per_mm)], remark)
     }
 }
 

@@ -60,23 +60,19 @@ impl CalibrationTarget {
 
     /// Reads the scene, which a calibration with an arm needs, and returns its path too.
     pub fn open_for_arm(&self) -> Result<(&Path, DraftScene), CliError> {
-        let scene = self.scene.as_deref().ok_or_else(|| CliError::Usage(NO_SCENE.to_owned()))?;
+        let scene = self.scene.as_deref().ok_or_else(|| CliError::usage(NO_SCENE))?;
         Ok((scene, self.open_scene()?))
     }
 
     /// Puts `found` into the scene and prints what it was.
-    pub fn write(
-        &self,
-        draft: &DraftScene,
-        change: &Change,
-        found: &(impl Serialize + Display),
-    ) -> Result<(), CliError> {
-        let Change { settings, remark, expected } = change;
+    pub fn write(&self, draft: &DraftScene, found: &impl Calibrated) -> Result<(), CliError> {
+        let mut expected = draft.scene.clone();
+        let (settings, remark) = found.set_in(&mut expected);
         let start = match draft.text.as_str() {
             "" => format!("{}\n", new_file(found)),
             text => text.to_owned(),
         };
-        let text = Scene::edited(&start, settings, remark, expected)?;
+        let text = Scene::edited(&start, &settings, &remark, &expected)?;
         write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
         print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()));
         Ok(())
@@ -89,11 +85,8 @@ fn new_file(found: &impl Display) -> String {
     lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
-/// The change of the scene by a calibration.
-pub(super) struct Change {
-    pub settings: Vec<Setting>,
-    /// its source, in one line
-    pub remark: String,
-    /// the scene with it
-    pub expected: Scene,
+/// The result of a calibration, as it is printed, and what it changes in a scene.
+pub(super) trait Calibrated: Serialize + Display {
+    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they come from.
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
 }

@@ -1,17 +1,20 @@
-//! `touchup calibrate tip`: where the ball is in the tracked stylus, from a swing about it; with an arm: `tip_by_arm`.
+//! `touchup calibrate tip`: where the ball is: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of
+//! one flat spot with a probe that leans.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use nalgebra::Vector3;
-use serde::Serialize;
+use nalgebra::{Point3, Vector3};
 
 use super::super::arm::{CellArguments, RobotName};
+use super::super::probing::millimetres;
 use super::super::{CliError, Losses, reported};
-use super::{CalibrationRecording, CalibrationTarget, Change, DraftScene, Vector, rounded};
-use crate::calibrate::{SwingPose, TipFit, TipFitParams, fit_tip};
+use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
+use crate::calibrate::{PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip, fit_tip_by_plane};
+use crate::probing::execute::{Cell, NotReached, TipPoses};
 use crate::scene::{Scene, Setting};
+use crate::sim::ArmParams;
 
 #[derive(Debug, Args)]
 #[group(id = "swing", required = true, multiple = false, args = ["bag", "robot"])]
@@ -21,19 +24,19 @@ pub(in crate::cli) struct TipArguments {
     bag: Option<PathBuf>,
     /// An arm that touches --spot with its probe leaning to all sides; it needs --scene
     #[arg(long, value_name = "ARM", requires = "spot")]
-    pub(super) robot: Option<RobotName>,
+    robot: Option<RobotName>,
     #[command(flatten)]
-    pub(super) cell: CellArguments,
+    cell: CellArguments,
     /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan, mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    pub(super) spot: Option<String>,
+    spot: Option<String>,
     /// True position of the ball of a simulated arm in the flange, mm; default: robot.tip_position_mm of the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    pub(super) truth_tip_mm: Option<String>,
+    truth_tip_mm: Option<String>,
     #[command(flatten)]
     source: CalibrationRecording,
     #[command(flatten)]
-    pub(super) target: CalibrationTarget,
+    target: CalibrationTarget,
 }
 
 /// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
@@ -65,7 +68,10 @@ impl Swing {
 
 /// The verb.
 pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
-    let TipArguments { bag, source, target, .. } = arguments;
+    let TipArguments { bag, robot, spot, source, target, .. } = arguments;
+    if let (Some(robot), Some(spot)) = (robot, spot) {
+        return tip_by_arm(arguments, *robot, spot);
+    }
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
@@ -74,14 +80,29 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
     let fit = fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::calibration(bag, error))?;
-    let found = TipFound::of(&fit);
-    target.write(&draft, &found.change(&draft), &found)?;
+    target.write(&draft, &TipFound::of(&fit))?;
     Ok(replayed.losses)
+}
+
+/// - `spot`: as it was written, X,Y,Z in mm.
+fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
+    let TipArguments { cell, truth_tip_mm, target, .. } = arguments;
+    let place = Point3::from(millimetres("--spot", spot)?);
+    let (scene, draft) = target.open_for_arm()?;
+    let truth = |arm: ArmParams, _: &Scene| {
+        let Some(text) = truth_tip_mm else { return Ok(arm) };
+        let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
+        Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
+    };
+    let (measured, of_arm) = cell.measure(robot, scene, "touch", truth, |prober| prober.measure_tip(&place))?;
+    let TipPoses { poses_bf, normal_b, not_reached } = measured;
+    let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
+    target.write(&draft, &PivotFound::of(&fit, &of_arm, &not_reached))?;
+    Ok(Losses::new())
 }
 
 reported! {
     /// What `--json` prints.
-    #[derive(Debug, Serialize)]
     struct TipFound, fn of(fit: &TipFit) {
         poses: usize = fit.poses,
         left_out: usize = fit.rejected,
@@ -96,16 +117,12 @@ reported! {
     }
 }
 
-impl TipFound {
-    fn change(&self, draft: &DraftScene) -> Change {
+impl Calibrated for TipFound {
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
-        let mut expected: Scene = draft.scene.clone();
-        expected.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
-        Change {
-            settings: vec![Setting::list(&["tip", "offset_mm"], &offset_mm)],
-            remark: format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm),
-            expected,
-        }
+        scene.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
+        let remark = format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm);
+        (vec![Setting::list("tip.offset_mm", &offset_mm)], remark)
     }
 }
 
@@ -116,5 +133,43 @@ impl fmt::Display for TipFound {
         writeln!(f, "offset      {offset_mm} mm, in the axes of the recorded pose")?;
         writeln!(f, "rested at   {rest_mm} mm, in the frame of the poses")?;
         write!(f, "residuals   {residual_mm:.4} mm rms")
+    }
+}
+
+reported! {
+    /// What `--json` prints of an arm.
+    struct PivotFound, fn of(fit: &PlaneTipFit, cell: &Cell, unreached: &[NotReached]) {
+        touches: usize = fit.touches,
+        /// centre of the ball in the flange
+        tip_position_mm: Vector = Vector::of(&moved(cell.pose_ft.translation.vector, &fit.offset), 1e3),
+        /// correction to the scene, in the flange
+        moved_mm: [f64; 3] = (fit.offset.value * 1e3).into(),
+        residual_mm: f64 = fit.rms * 1e3,
+        /// unreachable orientations, and why
+        not_reached: Vec<String> = unreached.iter().map(ToString::to_string).collect(),
+    }
+}
+
+fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
+    VectorEstimate { value: from + by.value, sigma: by.sigma }
+}
+
+impl Calibrated for PivotFound {
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+        let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
+        scene.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;
+        let remark = format!("tip: {} touches, residuals {:.4} mm rms", self.touches, self.residual_mm);
+        (vec![Setting::list("robot.tip_position_mm", &tip_position_mm)], remark)
+    }
+}
+
+impl fmt::Display for PivotFound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
+        let [x, y, z] = self.moved_mm;
+        writeln!(f, "touches: {}", self.touches)?;
+        writeln!(f, "tip         {} mm, in the flange", self.tip_position_mm)?;
+        writeln!(f, "that is     {x:+.4}, {y:+.4}, {z:+.4} mm from where the scene had it")?;
+        write!(f, "residuals   {:.4} mm rms off one plane", self.residual_mm)
     }
 }

@@ -47,7 +47,7 @@ pub(super) struct Alignment {
 
 reported! {
     /// Moves the mesh, as it is in its file, onto the truth.
-    #[derive(Debug, Default, Serialize)]
+    #[derive(Default)]
     struct MotionReport, fn of(motion: &Isometry3<f64>) {
         /// rows of the rotation
         rotation: [[f64; 3]; 3] = motion.rotation.to_rotation_matrix().matrix().transpose().into(),
@@ -57,7 +57,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct FitReport, fn of(fit: &IcpFit, count: usize) {
         points: usize = count,
         inliers: usize = fit.inliers,
@@ -66,7 +65,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct Explained, fn of(alternative: &Alternative, counts: [usize; 2]) {
         /// features of the mesh that lie on one of the truth
         explained_features: usize = alternative.explained.len(),
@@ -79,7 +77,6 @@ reported! {
 
 reported! {
     /// Residual of a pair: truth − moved mesh.
-    #[derive(Debug, Serialize)]
     struct Residual, fn of(name: &str, residual: &Vector3<f64>) {
         pair: String = name.to_owned(),
         residual_mm: [f64; 3] = (residual * 1e3).into(),
@@ -89,7 +86,6 @@ reported! {
 
 reported! {
     /// An unconstrained motion: a shift along and a turn about a point.
-    #[derive(Debug, Serialize)]
     struct Loose, fn of(motion: &Motion, fit: &IcpFit) {
         /// of the point `about_mm`, times any length
         shift: [f64; 3] = motion.shift.into(),
@@ -99,17 +95,20 @@ reported! {
     }
 }
 
-/// The motions of which one must be chosen.
-#[derive(Debug, Serialize)]
-struct Choices {
-    ambiguous: Vec<Choice>,
-    /// the axis about which each may be turned
-    #[serde(skip_serializing_if = "Option::is_none")]
-    free_turn: Option<FreeTurnReport>,
+reported! {
+    /// The motions of which one must be chosen.
+    struct Choices, fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) {
+        ambiguous: Vec<Choice> =
+            (1..).zip(alternatives).map(|(number, one)| Choice::of(number, one, counts)).collect(),
+        /// the axis about which each may be turned
+        free_turn?: FreeTurnReport = match error {
+            FeaturesError::FreeTurn { turn, .. } => Some(FreeTurnReport::of(turn)),
+            _ => None,
+        },
+    }
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct FreeTurnReport, fn of(turn: &FreeTurn) {
         axis: [f64; 3] = turn.axis.into(),
         through_mm: [f64; 3] = (turn.through.coords * 1e3).into(),
@@ -117,7 +116,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct Choice, fn of(number: usize, found: &Alternative, counts: [usize; 2]) {
         /// as --alternative takes it
         alternative: usize = number,
@@ -134,19 +132,19 @@ reported! {
     }
 }
 
-type Aligned = Result<(Isometry3<f64>, Alignment), CliError>;
+type Aligned = Result<(Isometry3<f64>, Option<Alignment>), CliError>;
 
 /// The motion that brings `mesh` onto the truth from roughly in place, and its report.
 ///
 /// # Errors
-/// [`CliError::Align`].
+/// [`CliError`].
 pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) -> Aligned {
     let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
     let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
     let alignment = Alignment::of_icp("icp", &fit, points.len());
     alignment.warn();
-    Ok((fit.source_to_target, alignment))
+    Ok((fit.source_to_target, Some(alignment)))
 }
 
 /// The same from anywhere, by features.
@@ -154,7 +152,7 @@ pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) 
 /// - `alternative`: which of several motions, from 1 on.
 ///
 /// # Errors
-/// [`CliError::AlignFeatures`], after the alternatives went to stdout; [`CliError::Usage`] where there are fewer.
+/// [`CliError`], after the alternatives went to stdout; [`CliError::usage`] where there are fewer.
 pub(super) fn aligned_by_features(
     mesh: &TriMesh,
     truth: IndexedMesh<'_>,
@@ -179,7 +177,7 @@ pub(super) fn aligned_by_features(
     let chosen = match (alternative, undecided) {
         (Some(number), _) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
             let motions = counted(found.len(), "motion was", "motions were");
-            CliError::Usage(format!("--alternative {number} is not there: {motions} found"))
+            CliError::usage(format!("--alternative {number} is not there: {motions} found"))
         })?,
         (None, None) => &found[0],
         (None, Some(error)) => {
@@ -194,13 +192,13 @@ pub(super) fn aligned_by_features(
     };
     let alignment = Alignment { explained: Some(Explained::of(chosen, counts)), ..alignment };
     alignment.warn();
-    Ok((chosen.source_to_target, alignment))
+    Ok((chosen.source_to_target, Some(alignment)))
 }
 
 /// The motion that fits pairs of picked points; `scan` is the mesh and `space` the truth.
 ///
 /// # Errors
-/// [`CliError::Table`], [`CliError::Calibration`].
+/// [`CliError`], [`CliError::calibration`].
 pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let file = read_pairs(path)?;
     let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(|error| CliError::calibration(path, error))?;
@@ -208,7 +206,7 @@ pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let names = if file.names.len() == file.pairs.len() { &file.names } else { &numbered };
     let residuals = names.iter().zip(&fit.residuals).map(|(name, residual)| Residual::of(name, residual)).collect();
     let alignment = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
-    Ok((fit.motion, alignment))
+    Ok((fit.motion, Some(alignment)))
 }
 
 fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
@@ -225,17 +223,6 @@ pub(super) fn moved(mesh: &TriMesh, pose: &Isometry3<f64>) -> TriMesh {
         }
     }
     moved
-}
-
-impl Choices {
-    fn of(alternatives: &[Alternative], counts: [usize; 2], error: &FeaturesError) -> Self {
-        let free_turn = match error {
-            FeaturesError::FreeTurn { turn, .. } => Some(FreeTurnReport::of(turn)),
-            _ => None,
-        };
-        let choices = (1..).zip(alternatives).map(|(number, one)| Choice::of(number, one, counts));
-        Self { ambiguous: choices.collect(), free_turn }
-    }
 }
 
 impl Alignment {
@@ -278,12 +265,8 @@ impl fmt::Display for Alignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.motion.translation_mm;
         write!(f, "aligned by {}: shift ({x:.3}, {y:.3}, {z:.3}) mm", self.method)?;
-        if let Some(explained) = &self.explained {
-            write!(f, ", {explained}")?;
-        }
-        if let Some(rms_mm) = self.rms_mm {
-            write!(f, ", rms {rms_mm:.4} mm")?;
-        }
+        self.explained.iter().try_for_each(|explained| write!(f, ", {explained}"))?;
+        self.rms_mm.iter().try_for_each(|rms_mm| write!(f, ", rms {rms_mm:.4} mm"))?;
         for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
             write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;
         }
@@ -302,10 +285,7 @@ impl fmt::Display for Alignment {
 impl fmt::Display for Explained {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} of {}", self.explained_features, counted(self.mesh_features, "feature", "features"))?;
-        match self.agreeing_share {
-            Some(share) => write!(f, " and {:.1} % of the surface agree", share * 100.0),
-            None => Ok(()),
-        }
+        self.agreeing_share.iter().try_for_each(|share| write!(f, " and {:.1} % of the surface agree", share * 100.0))
     }
 }
 

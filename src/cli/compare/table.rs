@@ -4,30 +4,32 @@ use std::fmt;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::alignment::Alignment;
 use crate::cli::{counted, reported};
 use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
 use crate::mesh::TriMesh;
 
-/// What `--json` prints.
-#[derive(Debug, Serialize)]
-pub(in crate::cli) struct CompareReport {
-    pub(super) mesh: ShapeReport,
-    pub(super) truth: ShapeReport,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) alignment: Option<Alignment>,
-    /// the scan, with --before
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) before: Option<ComparisonReport>,
-    /// the mesh
-    pub(super) after: ComparisonReport,
+reported! {
+    /// What `--json` prints.
+    pub(in crate::cli) struct CompareReport, pub fn of(
+        shapes: [(&Path, &TriMesh); 2],
+        aligned: Option<Alignment>,
+        scanned: Option<&Comparison>,
+        refined: &Comparison
+    ) {
+        mesh: ShapeReport = ShapeReport::of(shapes[0].0, shapes[0].1),
+        truth: ShapeReport = ShapeReport::of(shapes[1].0, shapes[1].1),
+        alignment?: Alignment = aligned,
+        /// the scan, with --before
+        before?: ComparisonReport = scanned.map(ComparisonReport::of),
+        /// the mesh
+        after: ComparisonReport = ComparisonReport::of(refined),
+    }
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
-    pub(super) struct ShapeReport, pub fn of(path: &Path, mesh: &TriMesh) {
+    struct ShapeReport, fn of(path: &Path, mesh: &TriMesh) {
         file: String = path.display().to_string(),
         vertices: usize = mesh.vertex_count(),
         faces: usize = mesh.face_count(),
@@ -44,8 +46,7 @@ pub(super) fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
 
 reported! {
     /// What `--json` prints of one mesh.
-    #[derive(Debug, Serialize)]
-    pub(super) struct ComparisonReport, pub fn of(comparison: &Comparison) {
+    struct ComparisonReport, fn of(comparison: &Comparison) {
         /// points spread over each surface
         density_per_mm2: f64 = comparison.density * 1e-6,
         /// of the true surface, which the mesh does not show: never scanned, or missing
@@ -56,7 +57,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct DeviationRow, fn of(part: &RegionComparison) {
         region: &'static str = name_of(part.region),
         mesh_to_truth: Option<SummaryReport> = part.mesh_to_truth.as_ref().map(SummaryReport::of),
@@ -68,14 +68,12 @@ reported! {
         /// of `mesh_to_truth`
         histogram: HistogramReport = HistogramReport::of(&part.histogram),
         /// of `mesh_to_truth`, within --tolerance-mm
-        #[serde(skip_serializing_if = "Option::is_none")]
-        within_tolerance_share: Option<f64> = part.within_tolerance,
+        within_tolerance_share?: f64 = part.within_tolerance,
     }
 }
 
 reported! {
     /// Distances; all but `bias_mm` without sign.
-    #[derive(Debug, Serialize)]
     struct SummaryReport, fn of(summary: &Summary) {
         points: usize = summary.points,
         mean_mm: f64 = summary.mean * 1e3,
@@ -85,8 +83,7 @@ reported! {
         p99_mm: f64 = summary.p99 * 1e3,
         max_mm: f64 = summary.max * 1e3,
         /// not of clouds, which have no sides
-        #[serde(skip_serializing_if = "Option::is_none")]
-        bias_mm: Option<f64> = Some(summary.bias * 1e3),
+        bias_mm?: f64 = Some(summary.bias * 1e3),
     }
 }
 
@@ -97,7 +94,6 @@ impl SummaryReport {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct NormalsReport, fn of(tilt: &TiltSummary) {
         median_deg: f64 = tilt.median.to_degrees(),
         p95_deg: f64 = tilt.p95.to_degrees(),
@@ -107,7 +103,6 @@ reported! {
 }
 
 reported! {
-    #[derive(Debug, Serialize)]
     struct HistogramReport, fn of(histogram: &Histogram) {
         from_mm: f64 = histogram.from * 1e3,
         bin_mm: f64 = histogram.width * 1e3,

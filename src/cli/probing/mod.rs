@@ -14,7 +14,7 @@ use tracing::info;
 
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, Refined};
-use super::{CliError, Losses, not_written, write_json};
+use super::{CliError, Losses, not_written, require, write_json};
 use crate::features::Kind;
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
@@ -76,8 +76,8 @@ impl Ready {
     /// Reads scene and scan.
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
         let scene = Scene::read(scene)?;
-        let (cell, params) = scene.probing().ok_or_else(|| CliError::Usage(NO_ROBOT.to_owned()))?;
-        let MeshFile { mesh, repair } = read_mesh(scan, unit).map_err(CliError::ReadMesh)?;
+        let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
+        let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
         info!(%repair, "scan");
         Ok(Self { cell, params, scene, mesh })
     }
@@ -100,12 +100,9 @@ impl Ready {
     /// Whether the scene allows motion.
     ///
     /// # Errors
-    /// [`CliError::Usage`]
+    /// [`CliError::usage`]
     pub fn may_move(&self) -> Result<(), CliError> {
-        match self.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion) {
-            true => Ok(()),
-            false => Err(CliError::Usage(NO_MOTION.to_owned())),
-        }
+        require(self.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion), NO_MOTION)
     }
 }
 
@@ -123,7 +120,7 @@ impl Probing<'_> {
         let now = arm.next_state().map_err(CliError::arm)?;
         let world = ready.static_world();
         let plan_of = |flag: &Flag| {
-            plan(&ready.cell, &ready.params, &world, flag, &now).map_err(|error| CliError::Explore(flag.id, error))
+            plan(&ready.cell, &ready.params, &world, flag, &now).map_err(|error| CliError::plan(flag.id, error))
         };
         let plans = self.flags.iter().map(plan_of).collect::<Result<Vec<_>, _>>()?;
         draw_plan(&ready.mesh, &plans, self.flags, &self.out.join("plan.png"))?;
@@ -137,10 +134,8 @@ impl Probing<'_> {
         let mut world = LiveWorld::new(scan, &ready.scene, &ready.cell, self.is_simulated)?;
         let mut probed = Vec::new();
         for flag in self.flags {
-            let one = Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag);
-            let stopped = matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled);
-            probed.push(one);
-            if stopped {
+            probed.push(Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag));
+            if probed.last().is_some_and(|one| matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled)) {
                 break;
             }
         }
@@ -151,7 +146,7 @@ impl Probing<'_> {
         write_probed_touches(&probed, ready.params.pattern.ball_radius, &path).map_err(not_written(&path))?;
         let messages = world.finish()?;
         let bag = self.out.join("touch.mcap");
-        write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::WriteRecording)?;
+        write_recording(&bag, &probe_topics(), BASE_FRAME, PROBE_FRAME, messages).map_err(CliError::not_written)?;
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let arguments = RefineArguments::in_folder(scan, self.unit, self.out, scene, probe_topics());
         let Refined { summary: refine, mut losses, .. } = arguments.refined()?;
@@ -164,7 +159,7 @@ impl Probing<'_> {
         if not_begun > 0 {
             losses.push(format!("{not_begun} of {} flags were not begun", self.flags.len()));
         }
-        let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit).map_err(CliError::ReadMesh)?;
+        let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
         draw_touches(&mesh, &probed, self.flags, &self.out.join("touches.png"))?;
         Ok(Done { summary: ProbingSummary { features, refine }, probed, losses })
     }
@@ -178,7 +173,7 @@ fn metres(text: &str) -> Option<Vec<f64>> {
 /// A place that was written X,Y,Z in mm, m.
 pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
     let place: Option<[f64; 3]> = metres(text).and_then(|place| place.try_into().ok());
-    place.map(Vector3::from).ok_or_else(|| CliError::Usage(format!("{flag} {text} is not X,Y,Z in mm")))
+    place.map(Vector3::from).ok_or_else(|| CliError::usage(format!("{flag} {text} is not X,Y,Z in mm")))
 }
 
 /// A flag of a command line.
@@ -187,7 +182,7 @@ pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliErr
 pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError> {
     const FORM: &str =
         "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
-    let wrong = || CliError::Usage(format!("--feature {text} is not {FORM}"));
+    let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
     let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
     match metres(numbers).ok_or_else(wrong)?[..] {

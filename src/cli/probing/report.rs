@@ -13,7 +13,7 @@ use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide};
 
 reported! {
     /// One flag: of `probed.json`.
-    #[derive(Clone, Debug, Serialize)]
+    #[derive(Clone)]
     pub(in crate::cli) struct ProbedRecord, fn of(probed: &Probed, flagged: Option<&Flag>) {
         flag: u32 = probed.flag,
         kind: &'static str = flagged.and_then(|flag| flag.kind).map_or("unknown", Kind::name),
@@ -30,16 +30,14 @@ reported! {
         duration_s: f64 = probed.seconds,
         largest_force_n: f64 = probed.peak_force,
         /// of the wanted number, mm or rad
-        #[serde(skip_serializing_if = "Option::is_none")]
-        uncertainty_mm: Option<f64> = probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
-        #[serde(skip_serializing_if = "Option::is_none")]
-        feature: Option<FeatureRecord> = probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(Into::into),
+        uncertainty_mm?: f64 = probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
+        feature?: FeatureRecord = probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(FeatureRecord::of),
     }
 }
 
 reported! {
     /// One slide.
-    #[derive(Clone, Debug, Serialize)]
+    #[derive(Clone)]
     struct SlideRecordOfFile, fn of(probed: &ProbedSlide) {
         /// its outcome, or why it was not made
         ending: String = match &probed.record {
@@ -47,14 +45,13 @@ reported! {
             None => probed.refused.clone().unwrap_or_default(),
         },
         length_mm: f64 = probed.slide.length() * 1e3,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        forces: Option<SlideForces> = probed.record.as_ref().map(SlideForces::of),
+        forces?: SlideForces = probed.record.as_ref().map(SlideForces::of),
     }
 }
 
 reported! {
     /// The contact force along it.
-    #[derive(Clone, Debug, Serialize)]
+    #[derive(Clone)]
     struct SlideForces, fn of(record: &SlideRecord) {
         duration_s: f64 = (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
         mean_force_n: f64 = record.mean_force,
@@ -97,14 +94,10 @@ impl fmt::Display for ProbingSummary {
         for record in &self.features {
             let ProbedRecord { flag, kind, touches, duration_s, largest_force_n, ending, .. } = record;
             write!(f, "{kind} {flag}: {ending}")?;
-            if let Some(feature) = &record.feature {
-                write!(f, ": {}", numbers(feature))?;
-            }
+            record.feature.iter().try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
             let touches = counted(*touches, "touch", "touches");
             write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
-            for slide in &record.slides {
-                write!(f, "\n  {slide}")?;
-            }
+            record.slides.iter().try_for_each(|slide| write!(f, "\n  {slide}"))?;
             writeln!(f)?;
         }
         write!(f, "{}", self.refine)

@@ -82,7 +82,7 @@ impl Receive {
 
     /// Whether the library has a connection.
     pub fn is_connected(&self) -> bool {
-        Python::attach(|py| truth(self.0.call_method0(py, "isConnected"), py)).unwrap_or(false)
+        Python::attach(|py| self.0.call_method0(py, "isConnected")?.extract(py)).unwrap_or(false)
     }
 
     /// Of the newest state, s of the controller.
@@ -172,7 +172,7 @@ impl RtdeControl {
     }
 
     fn call(&self, name: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<bool, ChildError> {
-        Python::attach(|py| truth(self.0.call_method1(py, name, arguments), py)).map_err(failed(name))
+        Python::attach(|py| self.0.call_method1(py, name, arguments)?.extract(py)).map_err(failed(name))
     }
 }
 
@@ -237,8 +237,4 @@ impl Control for RtdeControl {
     fn end_program(&self) -> Result<(), ChildError> {
         self.call("stopScript", ()).map(drop)
     }
-}
-
-fn truth(answer: PyResult<Py<PyAny>>, py: Python<'_>) -> PyResult<bool> {
-    answer?.extract(py)
 }

@@ -46,21 +46,14 @@ pub fn run() -> Result<(), ChildError> {
     let connected = Receive::connect(&begin.host).and_then(|receive| Ok((receive, RtdeControl::connect(&begin.host)?)));
     let (receive, control) = connected.inspect_err(|error| shared.report(&failure(error)))?;
     let (sender, orders) = channel();
-    let (clock, hand) = if begin.is_lock_step {
-        let (clock, hand) = Clock::manual();
-        (clock, Some(hand))
-    } else {
-        (Clock::system(), None)
-    };
+    let (clock, hand) = begin.is_lock_step.then(Clock::manual).unzip();
+    let clock = clock.unwrap_or_else(Clock::system);
     thread::scope(|scope| {
         scope.spawn(|| states::hand_on(&receive, &shared, hand.as_ref()));
         scope.spawn(move || {
-            for line in lines {
-                let Ok(order) = serde_json::from_str::<Order>(&line) else { continue };
-                if sender.send(order).is_err() {
-                    break;
-                }
-            }
+            let mut orders = lines.filter_map(|line| serde_json::from_str::<Order>(&line).ok());
+            // until nobody takes them any more
+            let _ = orders.try_for_each(|order| sender.send(order));
         });
         match Driver::new(&control, &shared, &begin, clock).run(&orders) {
             Ok(()) => leave(0),

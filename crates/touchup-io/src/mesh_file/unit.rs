@@ -33,18 +33,14 @@ words! {
 impl MeshUnit {
     /// Length of the unit, m.
     pub const fn metres(self) -> f64 {
-        match self {
-            Self::Metre => 1.0,
-            Self::Millimetre => 1e-3,
-            Self::Inch => 0.0254,
-        }
+        self.metres_and_plural().0
     }
 
-    const fn plural(self) -> &'static str {
+    const fn metres_and_plural(self) -> (f64, &'static str) {
         match self {
-            Self::Metre => "metres",
-            Self::Millimetre => "millimetres",
-            Self::Inch => "inches",
+            Self::Metre => (1.0, "metres"),
+            Self::Millimetre => (1e-3, "millimetres"),
+            Self::Inch => (0.0254, "inches"),
         }
     }
 }
@@ -82,7 +78,9 @@ impl fmt::Display for Implausible {
         let [x, y, z] = [sides.x, sides.y, sides.z].map(three_digits);
         write!(f, "{x} x {y} x {z} {unit} is too {} for a work-piece: ", if small { "small" } else { "large" })?;
         match suggestion {
-            Some(other) => write!(f, "the file is probably in {}, try --mesh-unit {other}", other.plural()),
+            Some(other) => {
+                write!(f, "the file is probably in {}, try --mesh-unit {other}", other.metres_and_plural().1)
+            }
             None => write!(f, "it fits in no unit (diagonal from {SMALLEST_M} to {LARGEST_M} m): scale the file"),
         }
     }

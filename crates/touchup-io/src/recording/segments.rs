@@ -30,8 +30,8 @@ pub struct SegmentedWriter {
 #[derive(Clone, Debug)]
 struct FileSegment {
     name: String,
-    poses: u64,
-    wrenches: u64,
+    /// poses and wrenches
+    counts: [u64; 2],
     first_ns: i64,
     last_ns: i64,
     /// it has its index, and a proper end
@@ -52,17 +52,14 @@ impl SegmentedWriter {
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn write(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
-        let is_full = |segment: &FileSegment| segment.poses + segment.wrenches >= MOST_IN_A_SEGMENT;
+        let is_full = |segment: &FileSegment| segment.counts.iter().sum::<u64>() >= MOST_IN_A_SEGMENT;
         if self.current.is_none() || self.segments.last().is_none_or(is_full) {
             self.begin_segment(message.stamp_ns())?;
         }
         let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
         writer.write(*message, frame)?;
         self.unflushed += 1;
-        match message {
-            Message::Pose(_) => segment.poses += 1,
-            Message::Wrench(_) => segment.wrenches += 1,
-        }
+        segment.counts[usize::from(matches!(message, Message::Wrench(_)))] += 1;
         segment.first_ns = segment.first_ns.min(message.stamp_ns());
         segment.last_ns = segment.last_ns.max(message.stamp_ns());
         Ok(())
@@ -75,7 +72,7 @@ impl SegmentedWriter {
         let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
         self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics)?);
         let (first_ns, last_ns) = (stamp_ns, stamp_ns);
-        self.segments.push(FileSegment { name, poses: 0, wrenches: 0, first_ns, last_ns, is_whole: false });
+        self.segments.push(FileSegment { name, counts: [0; 2], first_ns, last_ns, is_whole: false });
         Ok(())
     }
 
@@ -141,8 +138,7 @@ impl SegmentedWriter {
     /// As rosbag2 writes it, version 5: every release reads that.
     fn metadata(&self) -> String {
         let all = &self.segments;
-        let [poses, wrenches] =
-            [|s: &FileSegment| s.poses, |s: &FileSegment| s.wrenches].map(|of| all.iter().map(of).sum::<u64>());
+        let [poses, wrenches] = [0, 1].map(|at| all.iter().map(|segment| segment.counts[at]).sum::<u64>());
         let first_ns = all.iter().map(|segment| segment.first_ns).min().unwrap_or(0);
         let last_ns = all.iter().map(|segment| segment.last_ns).max().unwrap_or(0);
         let mut text = format!(
@@ -165,7 +161,7 @@ impl SegmentedWriter {
             let _ = writeln!(text, "    - {}", segment.name);
         }
         text.push_str("  files:\n");
-        for FileSegment { name, poses, wrenches, first_ns, last_ns, .. } in all {
+        for FileSegment { name, counts: [poses, wrenches], first_ns, last_ns, .. } in all {
             let _ = write!(
                 text,
                 "    - path: {name}\n      starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        \

@@ -27,7 +27,6 @@ use touchup_core::haptic::{RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, Sample};
-use worker::Question;
 
 /// When the patch of an [`Engine`] is made.
 #[derive(Clone, Debug)]
@@ -113,10 +112,7 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn rest(&mut self) -> Result<(), LiveError> {
-        match &mut self.patch {
-            Reconstruction::Beside(renewals) => renewals.rest(&mut self.refiner),
-            _ => Ok(()),
-        }
+        if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.rest(&mut self.refiner) } else { Ok(()) }
     }
 
     /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing where the patch is made at the end.
@@ -124,9 +120,10 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn catch_up(&mut self) -> Result<(), LiveError> {
-        match &mut self.patch {
-            Reconstruction::Beside(renewals) => renewals.catch_up(&mut self.refiner),
-            _ => Ok(()),
+        if let Reconstruction::Beside(renewals) = &mut self.patch {
+            renewals.catch_up(&mut self.refiner)
+        } else {
+            Ok(())
         }
     }
 
@@ -143,11 +140,7 @@ impl Engine {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn undo(&mut self) -> Result<bool, LiveError> {
-        match &mut self.patch {
-            Reconstruction::Without => Ok(self.refiner.undo()),
-            Reconstruction::AtEnd(patcher) => Ok(patcher.undo()),
-            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, Question::Undo),
-        }
+        self.change_strokes(Refiner::undo, Patcher::undo)
     }
 
     /// Redoes the last undone stroke, as [`Patcher::redo`]. Returns whether there was anything.
@@ -155,10 +148,18 @@ impl Engine {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn redo(&mut self) -> Result<bool, LiveError> {
+        self.change_strokes(Refiner::redo, Patcher::redo)
+    }
+
+    fn change_strokes(
+        &mut self,
+        of_refiner: fn(&mut Refiner) -> bool,
+        of_patcher: fn(&mut Patcher) -> bool,
+    ) -> Result<bool, LiveError> {
         match &mut self.patch {
-            Reconstruction::Without => Ok(self.refiner.redo()),
-            Reconstruction::AtEnd(patcher) => Ok(patcher.redo()),
-            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, Question::Redo),
+            Reconstruction::Without => Ok(of_refiner(&mut self.refiner)),
+            Reconstruction::AtEnd(patcher) => Ok(of_patcher(patcher)),
+            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, of_patcher),
         }
     }
 
@@ -183,10 +184,7 @@ impl Engine {
 
     /// Touches that the patch beside the samples has added or removed since the last call.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
-        match &mut self.patch {
-            Reconstruction::Beside(renewals) => renewals.take_probed(),
-            _ => None,
-        }
+        if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.take_probed() } else { None }
     }
 
     /// From here on notes what changes in the mesh, for [`Self::take_changes`].

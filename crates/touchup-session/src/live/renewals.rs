@@ -155,14 +155,17 @@ impl Renewals {
             self.worker.ask(Question::Flush)?;
             self.due_ns.push_back(i64::MAX);
         }
-        self.take_up_all(refiner)?;
-        Ok(())
+        self.take_up_all(refiner).map(drop)
     }
 
     /// Takes the last stroke back, or does it again, as [`super::Engine::undo`] and [`super::Engine::redo`].
-    pub fn change_strokes(&mut self, refiner: &mut Refiner, question: Question) -> Result<bool, LiveError> {
+    pub fn change_strokes(
+        &mut self,
+        refiner: &mut Refiner,
+        change: fn(&mut Patcher) -> bool,
+    ) -> Result<bool, LiveError> {
         self.catch_up(refiner)?;
-        self.worker.ask(question)?;
+        self.worker.ask(Question::ChangeStrokes(change))?;
         self.due_ns.push_back(i64::MAX);
         self.take_up_all(refiner)
     }

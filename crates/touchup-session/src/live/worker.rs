@@ -21,8 +21,7 @@ pub(super) enum Question {
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and answer what changed
-    Undo,
-    Redo,
+    ChangeStrokes(fn(&mut Patcher) -> bool),
 }
 
 /// Answers of the thread.
@@ -71,8 +70,7 @@ impl Worker {
                         continue;
                     }
                     Question::Flush => patcher.flush(),
-                    Question::Undo => has_changed_strokes = patcher.undo(),
-                    Question::Redo => has_changed_strokes = patcher.redo(),
+                    Question::ChangeStrokes(change) => has_changed_strokes = change(&mut patcher),
                 }
                 let delta = patcher.renewed(&scan.0, &scan.1);
                 let probed = published.changes(patcher.probed());

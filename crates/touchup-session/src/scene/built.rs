@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{Mode, Scene};
+use crate::reported;
 use touchup_core::haptic::Footprint;
 
 /// Parts by their names in the YAML, in its order; then what the program was built with, by feature.
@@ -19,7 +20,7 @@ pub struct Built {
 reported! {
     /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined scan, with the trees over it. What was
     /// touched comes to it.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    #[derive(Clone, Copy, PartialEq)]
     pub struct Memory, pub fn of(refiner: Footprint, scan_bytes: usize) {
         /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
         pub mesh_mb: f64 = refiner.mesh as f64 / 1e6,

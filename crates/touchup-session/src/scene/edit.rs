@@ -11,22 +11,22 @@ use super::{Scene, SceneError};
 /// One key and its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// From the section down, e.g. `["compensation", "bias", "force_n"]`.
-    pub path: Vec<&'static str>,
+    /// From the section down, e.g. `compensation.bias.force_n`.
+    pub path: &'static str,
     /// As YAML on one line: a number, a word, or a list in brackets.
     pub value: String,
 }
 
 impl Setting {
     /// A list of numbers in brackets.
-    pub fn list(path: &[&'static str], values: &[f64]) -> Self {
+    pub fn list(path: &'static str, values: &[f64]) -> Self {
         let values: Vec<_> = values.iter().map(f64::to_string).collect();
-        Self { path: path.to_vec(), value: format!("[{}]", values.join(", ")) }
+        Self { path, value: format!("[{}]", values.join(", ")) }
     }
 
     /// A number or a word.
-    pub fn scalar(path: &[&'static str], value: impl ToString) -> Self {
-        Self { path: path.to_vec(), value: value.to_string() }
+    pub fn scalar(path: &'static str, value: impl ToString) -> Self {
+        Self { path, value: value.to_string() }
     }
 }
 
@@ -40,15 +40,17 @@ impl Scene {
     /// # Errors
     /// [`SceneError::CannotEdit`] when the result would not be the expected scene.
     pub fn edited(yaml: &str, settings: &[Setting], remark: &str, expected: &Self) -> Result<String, SceneError> {
-        let refused = |why: String| SceneError::CannotEdit { why, settings: listed(settings) };
+        let listed: Vec<_> = settings.iter().map(|Setting { path, value }| format!("{path}: {value}")).collect();
+        let refused = |why: String| SceneError::CannotEdit { why, settings: listed.join("; ") };
         let mut text = yaml.to_owned();
         for (i, Setting { path, value }) in settings.iter().enumerate() {
+            let keys: Vec<&str> = path.split('.').collect();
             let remark = if i == 0 { format!("  {} {remark}", block::MARK) } else { String::new() };
             let new = match flow::start(&text) {
-                Some(begin) => flow::set(&text, begin, path, value),
-                None => block::set(&text, path, value, &remark),
+                Some(begin) => flow::set(&text, begin, &keys, value),
+                None => block::set(&text, &keys, value, &remark),
             };
-            text = new.ok_or_else(|| refused(format!("{} is written in an unusual form", path.join("."))))?;
+            text = new.ok_or_else(|| refused(format!("{path} is written in an unusual form")))?;
         }
         match Self::from_yaml(&text) {
             Ok(scene) if scene == *expected => Ok(text),
@@ -56,9 +58,4 @@ impl Scene {
             Err(error) => Err(refused(error.to_string())),
         }
     }
-}
-
-fn listed(settings: &[Setting]) -> String {
-    let settings: Vec<_> = settings.iter().map(|s| format!("{}: {}", s.path.join("."), s.value)).collect();
-    settings.join("; ")
 }

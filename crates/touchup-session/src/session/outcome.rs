@@ -8,6 +8,7 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
+use crate::reported;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
@@ -69,7 +70,6 @@ pub struct Outcome {
 
 reported! {
     /// The patch in the report.
-    #[derive(Debug, Serialize)]
     pub struct PatchSummary, fn of(patched: &Patched, seconds: f64) {
         /// edge length of the new faces
         pitch_mm: f64 = patched.pitch * 1e3,

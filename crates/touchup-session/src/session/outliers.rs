@@ -2,14 +2,12 @@
 
 use std::fmt;
 
-use serde::Serialize;
-
+use crate::reported;
 use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Outlier, Outliers, Patched, Support};
 
 reported! {
     /// What `--json` prints of the uncertainty.
-    #[derive(Debug, Serialize)]
     pub struct UncertaintySummary, pub fn of(patched: &Patched, found: &Outliers) {
         /// median standard deviation of the vertices that were touched
         touched_sigma_mm: f64 = touched_sigma_mm(patched),
@@ -35,7 +33,6 @@ fn touched_sigma_mm(patched: &Patched) -> f64 {
 
 reported! {
     /// Contacts one after the other that were rejected.
-    #[derive(Debug, Serialize)]
     struct OutlierSummary, fn of(outlier: &Outlier) {
         /// stamp of the first
         stamp_s: f64 = outlier.stamp_ns as f64 * 1e-9,

@@ -281,16 +281,12 @@ impl Taker {
     }
 
     fn take(&mut self, message: &Message, frame: &str) {
-        if !self.is_asked() {
+        // the disk is tried where it has not refused, or long enough ago
+        if self.refused_at.is_some_and(|at| self.clock.since(at) < ASK_AGAIN) {
             locked(&self.shared).messages += 1;
         } else if let Err(error) = self.writer.write(message, frame) {
             self.refuse(1, &error);
         }
-    }
-
-    /// Whether the disk is tried: it has not refused, or long enough ago.
-    fn is_asked(&self) -> bool {
-        self.refused_at.is_none_or(|at| self.clock.since(at) >= ASK_AGAIN)
     }
 
     fn accept(&mut self) {

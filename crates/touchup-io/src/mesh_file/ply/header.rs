@@ -118,17 +118,7 @@ fn element(name: &str, count: &str, line: usize) -> Result<Element, Syntax> {
 }
 
 fn scalar(name: &str, place: FilePlace) -> Result<Scalar, Syntax> {
-    Ok(match name {
-        "char" | "int8" => Scalar::I8,
-        "uchar" | "uint8" => Scalar::U8,
-        "short" | "int16" => Scalar::I16,
-        "ushort" | "uint16" => Scalar::U16,
-        "int" | "int32" => Scalar::I32,
-        "uint" | "uint32" => Scalar::U32,
-        "float" | "float32" => Scalar::F32,
-        "double" | "float64" => Scalar::F64,
-        _ => return Err(Syntax::unexpected(place, "a type such as float or int", name)),
-    })
+    Scalar::of_name(name).ok_or_else(|| Syntax::unexpected(place, "a type such as float or int", name))
 }
 
 fn property(words: &[&str], place: FilePlace) -> Result<Property, Syntax> {

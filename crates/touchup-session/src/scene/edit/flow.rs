@@ -17,21 +17,16 @@ pub(super) fn start(text: &str) -> Option<usize> {
 pub(super) fn set(text: &str, begin: usize, path: &[&str], value: &str) -> Option<String> {
     let (first, rest) = path.split_first()?;
     let Mapping { entries, last, is_separated } = Mapping::read(text, begin)?;
+    let inner = rest.iter().rev().fold(value.to_owned(), |inner, key| format!("{{ {key}: {inner} }}"));
     let Some(entry) = entries.iter().find(|entry| entry.key == *first) else {
-        let inner = rest.iter().rev().fold(value.to_owned(), |inner, key| format!("{{ {key}: {inner} }}"));
         let separator = if is_separated { "" } else { "," };
         return Some(spliced(text, last, last, &format!("{separator} {first}: {inner}")));
     };
     let old = &text[entry.begin..entry.end];
-    if rest.is_empty() {
-        return Some(spliced(text, entry.begin, entry.end, &format!(" {value}")));
-    }
     match old.trim_start() {
-        inner if inner.starts_with('{') => set(text, entry.end - inner.len(), rest, value),
-        "" | "~" | "null" => {
-            let inner = rest.iter().rev().fold(value.to_owned(), |inner, key| format!("{{ {key}: {inner} }}"));
-            Some(spliced(text, entry.begin, entry.end, &format!(" {inner}")))
-        }
+        "" | "~" | "null" => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
+        _ if rest.is_empty() => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
+        old if old.starts_with('{') => set(text, entry.end - old.len(), rest, value),
         _ => None,
     }
 }
