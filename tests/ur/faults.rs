@@ -93,7 +93,7 @@ fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
             happen();
         }
     };
-    let mut onlooker = Onlooker { seen: &mut seen, is_cancelled: || false };
+    let mut onlooker = Onlooker { seen: &mut seen, stop_request: || None };
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     let up = at([x, y, 200e-3]);
     watched.line("going up", &up, SPEED, &TouchParams::default(), limits().force).err().unwrap()

@@ -18,7 +18,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use stand_in::{StandIn, limits, packages};
-use touchup::probing::arm::{OnsetVerdict, ProbeError, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched};
+use touchup::probing::arm::{
+    OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched,
+};
 use touchup::sim::ArmParams;
 use touchup::ur::UrArm;
 
@@ -36,18 +38,22 @@ fn at(place: [f64; 3]) -> Isometry3<f64> {
 }
 
 /// Looks on, and may want it to end.
-struct Onlooker<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> {
+struct Onlooker<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> Option<StopRequest>> {
     seen: S,
-    is_cancelled: C,
+    stop_request: C,
 }
 
-impl<S: FnMut(&touchup::probing::arm::ArmState), C: Fn() -> bool> touchup::probing::arm::Observer for Onlooker<S, C> {
+impl<S, C> touchup::probing::arm::Observer for Onlooker<S, C>
+where
+    S: FnMut(&touchup::probing::arm::ArmState),
+    C: Fn() -> Option<StopRequest>,
+{
     fn on_state(&mut self, state: &touchup::probing::arm::ArmState) {
         (self.seen)(state);
     }
 
-    fn is_cancelled(&self) -> bool {
-        (self.is_cancelled)()
+    fn stop_request(&self) -> Option<StopRequest> {
+        (self.stop_request)()
     }
 }
 
@@ -65,7 +71,7 @@ fn with_library(body: impl FnOnce(&Path) -> Result<(), ProbeError>) {
 }
 
 fn touched(arm: &mut UrArm, target: &TouchTarget) -> Result<TouchRecord, ProbeError> {
-    let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
+    let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     watched.zero()?;
     watched.touch(target, &TouchParams::default())

@@ -2,7 +2,7 @@
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideTarget, TouchParams, Watched};
+use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideTarget, StopRequest, TouchParams, Watched};
 use touchup::probing::plan::Station;
 use touchup::sim::ArmParams;
 
@@ -20,7 +20,7 @@ fn a_line_ends_at_its_place_and_turn() {
         let place = at([x - 20e-3, y + 10e-3, 40e-3]).translation;
         let to = Isometry3::from_parts(place, turn);
         let begun = arm.next_state().unwrap();
-        let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
+        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
         stand_in.send("mark begin");
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.line("going there", &to, 50e-3, &TouchParams::default(), 5.0)?;
@@ -64,7 +64,7 @@ fn a_slide_goes_over_a_rim() {
         let stations: Vec<_> = top.chain(rim).chain(side).collect();
         let last = stations.len() - 1;
         let target = SlideTarget { rotation: UnitQuaternion::identity(), stations, lift: 3e-3, give: 1.5e-3 };
-        let mut onlooker = Onlooker { seen: |_: &_| {}, is_cancelled: || false };
+        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.zero()?;
         let record = watched.slide(&target, &TouchParams::default())?;
@@ -182,7 +182,7 @@ fn a_cancelled_move_brakes_to_rest() {
         let mut arm = stand_in.connect(packages);
         let [x, y] = PLACE;
         let is_cancelled = std::cell::Cell::new(false);
-        let asked = || is_cancelled.get();
+        let asked = || is_cancelled.get().then_some(StopRequest::Retract);
         let from = arm.next_state().unwrap().pose_bt.translation.z;
         let mut seen = |state: &touchup::probing::arm::ArmState| {
             if !is_cancelled.get() && from - state.pose_bt.translation.z > 20e-3 {
@@ -190,7 +190,7 @@ fn a_cancelled_move_brakes_to_rest() {
                 is_cancelled.set(true);
             }
         };
-        let mut onlooker = Onlooker { seen: &mut seen, is_cancelled: asked };
+        let mut onlooker = Onlooker { seen: &mut seen, stop_request: asked };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         let down = at([x, y, 30e-3]);
         let error = watched.line("going down", &down, 50e-3, &TouchParams::default(), 5.0).err().unwrap();

@@ -135,7 +135,7 @@ impl Probing<'_> {
         let mut probed = Vec::new();
         for flag in self.flags {
             probed.push(Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag));
-            if probed.last().is_some_and(|one| matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled)) {
+            if probed.last().is_some_and(|one| matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled(_))) {
                 break;
             }
         }

@@ -74,7 +74,7 @@ fn code(ending: &Ending) -> &'static str {
         Ending::TouchesSpent => "touches_spent",
         Ending::TimeSpent => "time_spent",
         Ending::NothingFound(_) => "nothing_found",
-        Ending::Cancelled => "cancelled",
+        Ending::Cancelled(_) => "cancelled",
         Ending::OutOfLimits(_) => "out_of_limits",
         Ending::NoClearPath(_) => "no_clear_path",
         Ending::Stopped(_) => "stopped",

@@ -8,7 +8,7 @@ use crate::cli::CliError;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
-use crate::probing::arm::{ArmState, Observer};
+use crate::probing::arm::{ArmState, Observer, StopRequest};
 use crate::probing::execute::{Cell, Progress, World};
 use crate::scene::Scene;
 use crate::stylus::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
@@ -71,8 +71,8 @@ impl Observer for LiveWorld<'_> {
         }
     }
 
-    fn is_cancelled(&self) -> bool {
-        self.failed.is_some()
+    fn stop_request(&self) -> Option<StopRequest> {
+        self.failed.as_ref().map(|_| StopRequest::Retract)
     }
 }
 

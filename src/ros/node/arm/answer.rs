@@ -159,7 +159,7 @@ fn code_of(ending: &Ending) -> u8 {
         Ending::TouchesSpent => ProbeResult::TOUCHES_SPENT,
         Ending::TimeSpent => ProbeResult::TIME_SPENT,
         Ending::NothingFound(_) => ProbeResult::NOTHING_FOUND,
-        Ending::Cancelled => ProbeResult::CANCELLED,
+        Ending::Cancelled(_) => ProbeResult::CANCELLED,
         Ending::OutOfLimits(_) => ProbeResult::OUT_OF_LIMITS,
         Ending::NoClearPath(_) => ProbeResult::NO_CLEAR_PATH,
         Ending::Stopped(error) => stopped(error),

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 
 use super::common::Common;
 use crate::mesh::{FaceHit, TriMesh};
-use crate::probing::arm::{ArmState, Observer};
+use crate::probing::arm::{ArmState, Observer, StopRequest};
 use crate::probing::execute::{Phase, Progress, StaticWorld, World};
 use crate::ros::messages::ProbeFeedback;
 use crate::ros::node::convert::{as_pose, as_wrench};
@@ -149,8 +149,8 @@ impl Observer for ArmWorld<'_> {
         }
     }
 
-    fn is_cancelled(&self) -> bool {
-        self.link.common.why_not().is_some() || is_cancelled(self.watched)
+    fn stop_request(&self) -> Option<StopRequest> {
+        (self.link.common.why_not().is_some() || is_cancelled(self.watched)).then_some(StopRequest::Retract)
     }
 }
 

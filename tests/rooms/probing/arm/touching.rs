@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use touchup::features::{Feature, Kind, Measured};
 use touchup::probing::arm::{
     Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, Observer, OnsetVerdict, ProbeError, Safety,
-    TouchOutcome, TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched,
+    StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
@@ -275,8 +275,8 @@ impl Observer for Impatient {
         self.seen += 1;
     }
 
-    fn is_cancelled(&self) -> bool {
-        self.seen > 300
+    fn stop_request(&self) -> Option<StopRequest> {
+        (self.seen > 300).then_some(StopRequest::Retract)
     }
 }
 

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use touchup::features::Kind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
-use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, UrGeometry};
+use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry};
 use touchup::probing::execute::{
     Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
 };
@@ -25,6 +25,9 @@ struct StaticScan {
     tree: FaceTree,
     /// cancels after this many states
     patience: Option<usize>,
+    /// has it stay where it is after this many, and when that was, ns
+    stays_after: Option<usize>,
+    stayed_ns: i64,
     seen: usize,
     touches: Vec<usize>,
     /// what the mesh becomes when more than 2 N is measured
@@ -36,7 +39,9 @@ struct StaticScan {
 impl StaticScan {
     fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
-        Self { mesh, tree, patience: None, seen: 0, touches: Vec::new(), after: None, since_then: None }
+        let (patience, stays_after, stayed_ns) = (None, None, 0);
+        let (seen, touches, after, since_then) = (0, Vec::new(), None, None);
+        Self { mesh, tree, patience, stays_after, stayed_ns, seen, touches, after, since_then }
     }
 }
 
@@ -49,15 +54,20 @@ impl Observer for StaticScan {
             self.tree = FaceTree::new(&after);
             self.mesh = after;
         }
+        if Some(self.seen) == self.stays_after {
+            self.stayed_ns = state.stamp_ns;
+        }
         let z = state.pose_bt.translation.z;
-        if self.is_cancelled() {
+        if self.stop_request().is_some() {
             let [first, least] = self.since_then.unwrap_or([z; 2]);
             self.since_then = Some([first, least.min(z)]);
         }
     }
 
-    fn is_cancelled(&self) -> bool {
-        self.patience.is_some_and(|patience| self.seen > patience)
+    fn stop_request(&self) -> Option<StopRequest> {
+        let is_over = |patience: Option<usize>| patience.is_some_and(|patience| self.seen > patience);
+        let request = is_over(self.patience).then_some(StopRequest::Retract);
+        if is_over(self.stays_after) { Some(StopRequest::Stay) } else { request }
     }
 }
 
@@ -128,7 +138,7 @@ fn exhausted_limits_are_reported() {
 fn a_cancelled_probing_stops_and_retracts() {
     let mut world = StaticScan { patience: Some(6000), ..StaticScan::new(plate_scan(1)) };
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
-    assert_eq!(probed.ending, Ending::Cancelled);
+    assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
     assert!(!probed.touches.is_empty());
     assert!(end[2] > 14e-3, "{end:?}");
 }
@@ -140,10 +150,23 @@ fn a_cancelled_probing_goes_no_deeper() {
     for patience in (1..16).map(|times| 700 * times).chain((0..8).map(|times| 3000 + 211 * times)) {
         let mut world = StaticScan { patience: Some(patience), ..StaticScan::new(plate_scan(1)) };
         let (probed, _, end) = probed(&params(), &mut world, |_| {});
-        assert_eq!(probed.ending, Ending::Cancelled, "{patience}");
+        assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract), "{patience}");
         let [first, least] = world.since_then.unwrap();
         assert!(first - least < 2.7e-3, "{patience}: {:.1} mm deeper", (first - least) * 1e3);
         assert!(end[2] > 14e-3, "{patience}: {end:?}");
+    }
+}
+
+/// From 50 mm/s a stop takes 0.1 s, and a retraction is stopped as everything else is.
+#[test]
+fn a_probing_that_is_to_stay_stands_where_it_is() {
+    for (patience, stays_after) in [(None, 900), (None, 6000), (Some(6000), 6001), (Some(6000), 6100), (Some(900), 950)]
+    {
+        let mut world = StaticScan { patience, stays_after: Some(stays_after), ..StaticScan::new(plate_scan(1)) };
+        let (probed, at_rest_since, _) = probed(&params(), &mut world, |_| {});
+        assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay), "{patience:?}, {stays_after}");
+        let stood = at_rest_since - world.stayed_ns as f64 * 1e-9;
+        assert!(stood < 0.13, "{patience:?}, {stays_after}: after {stood} s");
     }
 }
 

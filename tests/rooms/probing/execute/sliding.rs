@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
-    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, TouchParams, Watched,
+    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, StopRequest, TouchParams, Watched,
 };
 use touchup::probing::execute::{Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan};
 use touchup::probing::plan::{Slide, Station};
@@ -181,8 +181,8 @@ impl Observer for Impatient {
         self.seen += usize::from(self.is_sliding);
     }
 
-    fn is_cancelled(&self) -> bool {
-        self.seen > 2000
+    fn stop_request(&self) -> Option<StopRequest> {
+        (self.seen > 2000).then_some(StopRequest::Retract)
     }
 }
 
@@ -206,7 +206,7 @@ impl World for Impatient {
 fn a_cancelled_slide_comes_out_of_the_hole() {
     let mut world = Impatient { inner: world(), is_sliding: false, seen: 0 };
     let (probed, end) = probed(&flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3), &mut world);
-    assert_eq!(probed.ending, Ending::Cancelled);
+    assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
     assert!(probed.found.is_some() && end.z > TOP + BALL + 1e-3, "{end}");
     assert!(probed.peak_force < 4.5, "{}", probed.peak_force);
 }

@@ -20,4 +20,4 @@ pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_
 pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
 pub use touch_params::{CRAWL, TouchParams};
 pub use touching::{TouchOutcome, TouchRecord, TouchTarget};
-pub use watched::{Observer, ProbeError, Watched};
+pub use watched::{Observer, ProbeError, StopRequest, Watched};

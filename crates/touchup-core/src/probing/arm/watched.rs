@@ -59,11 +59,13 @@ pub enum ProbeError {
         /// s
         limit_s: f64,
     },
-    /// A request cancelled it.
+    /// A request stopped it.
     #[error("cancelled while {doing}")]
     Cancelled {
         /// what was being done
         doing: &'static str,
+        /// what was asked for
+        request: StopRequest,
     },
 }
 
@@ -87,14 +89,25 @@ const PATIENCE: (f64, f64) = (3.0, 2.0);
 /// Forces above the trigger in a row that are contact; one alone is noise.
 pub(super) const TRIGGERS: u32 = 2;
 
+/// How an arm is asked to stop; the later one outranks the one before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum StopRequest {
+    /// At once; then back into free air.
+    #[error("the arm stopped and retracted")]
+    Retract,
+    /// At once, and nothing more moves, no retraction either.
+    #[error("the arm stopped and stays where it is")]
+    Stay,
+}
+
 /// Observes an arm while it moves.
 pub trait Observer {
     /// Receives each state, in their order.
     fn on_state(&mut self, state: &ArmState);
 
-    /// Is asked after each state whether to cancel.
-    fn is_cancelled(&self) -> bool {
-        false
+    /// Is asked after each state whether to stop.
+    fn stop_request(&self) -> Option<StopRequest> {
+        None
     }
 }
 
@@ -109,15 +122,15 @@ pub struct Watched<'a> {
     /// The station that the ball has come to on the current slide, also where that breaks off; of a touch 0 from its stand-off on.
     /// `None` while it is not at the first.
     pub reached: Option<usize>,
-    /// not so for the retraction that ends a cancelled probing
-    pub(crate) is_cancellable: bool,
+    /// the least request that stops it: a retraction goes on unless it has to stay
+    pub(crate) heeds: StopRequest,
 }
 
 impl<'a> Watched<'a> {
-    /// - `observer`: receives each state, and may cancel.
+    /// - `observer`: receives each state, and may stop it.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
-        let (peak_force, is_cancellable) = (0.0, true);
-        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, is_cancellable }
+        let (peak_force, heeds) = (0.0, StopRequest::Retract);
+        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, heeds }
     }
 
     /// The largest force of the current touch, or of all lines where there was none, N; and when the arm was seen last, by its clock, ns:
@@ -155,10 +168,10 @@ impl<'a> Watched<'a> {
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
         self.limits.check_state(&state).map_err(|error| ProbeError::Limit { doing, error })?;
-        if self.is_cancellable && self.observer.is_cancelled() {
-            return Err(ProbeError::Cancelled { doing });
+        match self.observer.stop_request().filter(|request| *request >= self.heeds) {
+            Some(request) => Err(ProbeError::Cancelled { doing, request }),
+            None => Ok(state),
         }
-        Ok(state)
     }
 
     fn stop(&self) -> Command {

@@ -5,7 +5,7 @@ use std::error::Error;
 use nalgebra::Point3;
 
 use super::links::LinkError;
-use crate::probing::arm::{LimitError, ProbeError, SlideRecord, TouchRecord};
+use crate::probing::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
 use crate::probing::plan::{ExploreError, Found, Slide, TouchPlan};
 
 /// How it ended; as an error, why it ended before all was done.
@@ -23,9 +23,9 @@ pub enum Ending {
     /// There is no such feature where it was searched.
     #[error("nothing found: {0}")]
     NothingFound(#[from] ExploreError),
-    /// A request cancelled it: the arm stopped, and retracted.
-    #[error("cancelled: the arm stopped and retracted")]
-    Cancelled,
+    /// A request stopped it.
+    #[error("cancelled: {0}")]
+    Cancelled(StopRequest),
     /// The arm did not move: it would leave its limits.
     #[error("not begun: {0}")]
     OutOfLimits(#[from] LimitError),
@@ -40,7 +40,7 @@ pub enum Ending {
 impl From<ProbeError> for Ending {
     fn from(error: ProbeError) -> Self {
         match error {
-            ProbeError::Cancelled { .. } => Self::Cancelled,
+            ProbeError::Cancelled { request, .. } => Self::Cancelled(request),
             error => Self::Stopped(error),
         }
     }

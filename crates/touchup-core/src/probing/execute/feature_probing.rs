@@ -6,7 +6,7 @@ use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
 use super::prober::{Flag, ProbeParams, Prober};
 use super::route::ToolState;
 use super::world::{Phase, Progress, World};
-use crate::probing::arm::{OnsetVerdict, ProbeError, TouchOutcome, TouchRecord, TouchTarget};
+use crate::probing::arm::{OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget};
 use crate::probing::plan::{ExploreError, Explorer, TouchPlan, TouchResult};
 
 /// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
@@ -115,7 +115,7 @@ impl FeatureProbing<'_, '_> {
     pub fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
         use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
         // a failed retraction outranks these
-        let is_unbroken = matches!(ended, Ok(_) | Err(Cancelled | TimeSpent));
+        let is_unbroken = matches!(ended, Ok(_) | Err(Cancelled(StopRequest::Retract) | TimeSpent));
         let may_move =
             is_unbroken || matches!(ended, Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. })));
         let retracted = if may_move { self.retract() } else { Ok(()) };
@@ -179,7 +179,7 @@ impl FeatureProbing<'_, '_> {
             LineGuard::Out | LineGuard::Retract => (touch.link_speed, limits.force),
         };
         let mut watched = self.prober.watched();
-        watched.is_cancellable = guard != LineGuard::Retract;
+        watched.heeds = if guard == LineGuard::Retract { StopRequest::Stay } else { StopRequest::Retract };
         let moved = watched.line(doing, to, speed, touch, trigger);
         let seen = watched.seen();
         self.keep(seen);
