@@ -26,6 +26,8 @@ pub enum Safety {
     Normal,
     Protective,
     Emergency,
+    /// a door is open
+    Safeguard,
 }
 
 /// What of the connections does not work.
@@ -39,6 +41,10 @@ pub struct Faults {
     pub is_unplugged: bool,
     /// the program hangs
     pub is_stuck: bool,
+    /// its main loop hangs as soon as it is ready for the next command: each is taken and none is read, and its threads live
+    pub is_hung: bool,
+    /// the dashboard does not answer
+    pub is_mute: bool,
     /// the controller has lost its power
     pub is_dead: bool,
 }
@@ -47,6 +53,8 @@ pub struct Faults {
 #[derive(Default)]
 struct Program {
     is_running: bool,
+    /// nothing of it goes on, nor is anything forgotten
+    is_paused: bool,
     /// s
     starts_at: Option<f64>,
     /// a command was run to its end and its number is still in the register
@@ -120,7 +128,11 @@ impl<'a> Controller<'a> {
     }
 
     pub fn is_playing(&self) -> bool {
-        self.program.is_running
+        self.program.is_running && !self.program.is_paused
+    }
+
+    pub fn is_paused(&self) -> bool {
+        self.program.is_paused
     }
 
     /// The client has written the register of commands.
@@ -143,12 +155,12 @@ impl<'a> Controller<'a> {
     pub fn may_tick(&mut self) -> bool {
         let id = self.ints_in[0];
         let is_at_work = self.program.braking.is_some() || !matches!(id, 0 | 6 | 10) && !self.program.is_handled;
-        if !self.program.is_running || self.is_heard || is_at_work || self.body.time < self.granted_until {
+        if !self.is_playing() || self.is_heard || is_at_work || self.body.time < self.granted_until {
             return true;
         }
         self.quiet_looks += 1;
         // with no client, or one that waits for a program that hangs, time passes all the same
-        let is_in_vain = self.owner.is_none() || self.faults.is_stuck;
+        let is_in_vain = self.owner.is_none() || self.faults.is_stuck || self.faults.is_hung;
         let [linear, angular] = self.body.velocity();
         let moves = linear.norm() + angular.norm() > 0.0;
         let patience = if moves && !is_in_vain { QUIET_LOOKS_MOVING } else { QUIET_LOOKS };
@@ -162,7 +174,7 @@ impl<'a> Controller<'a> {
             self.stop_for(Safety::Protective, "force over the limit of the safety system");
         }
         self.start_program();
-        if self.program.is_running {
+        if self.is_playing() {
             self.cycle();
         }
         self.body.tick();
@@ -197,6 +209,25 @@ impl<'a> Controller<'a> {
         self.body.brake();
     }
 
+    /// The arm stands, and the program does not go on until it is resumed.
+    pub fn pause(&mut self, why: &str) {
+        if self.is_playing() {
+            self.record.event(&format!("program pauses: {why}"));
+            self.program.is_paused = true;
+            self.body.brake();
+        }
+    }
+
+    /// Its threads go on where they were.
+    pub fn resume(&mut self) {
+        if self.program.is_paused && self.safety == Safety::Normal {
+            self.record.event("program resumes");
+            self.program.is_paused = false;
+            // a watchdog that does not count while paused
+            self.heard_at = self.body.time;
+        }
+    }
+
     /// The safety system stops the arm.
     pub fn stop_for(&mut self, safety: Safety, why: &str) {
         self.safety = safety;
@@ -212,6 +243,10 @@ impl<'a> Controller<'a> {
         if self.faults.is_stuck {
             self.ints_out[0] = 0;
             return;
+        }
+        if self.faults.is_hung {
+            self.ints_out[0] = 1;
+            return self.speed();
         }
         if let Some(deceleration) = self.program.braking {
             let [linear, angular] = self.body.velocity();

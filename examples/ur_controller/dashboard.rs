@@ -13,7 +13,7 @@ pub fn serve(mut socket: TcpStream, controller: &Mutex<Controller>) -> anyhow::R
     for line in lines {
         let line = line?;
         let mut controller = controller.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
-        if controller.faults.is_unplugged {
+        if controller.faults.is_unplugged || controller.faults.is_mute {
             continue;
         }
         let answer = answer(&mut controller, line.trim());
@@ -34,13 +34,17 @@ fn answer(controller: &mut Controller, line: &str) -> String {
         "safetystatus" => match controller.safety {
             Safety::Normal => "Safetystatus: NORMAL",
             Safety::Protective => "Safetystatus: PROTECTIVE_STOP",
+            Safety::Safeguard => "Safetystatus: SAFEGUARD_STOP",
             Safety::Emergency => "Safetystatus: ROBOT_EMERGENCY_STOP",
         }
         .to_owned(),
-        "stop" => {
+        "stop" if controller.is_playing() || controller.is_paused() => {
             controller.stop_program("dashboard");
             "Stopped".to_owned()
         }
+        "stop" => "Failed to execute: stop".to_owned(),
+        "programState" if controller.is_playing() => "PLAYING".to_owned(),
+        "programState" => if controller.is_paused() { "PAUSED" } else { "STOPPED" }.to_owned(),
         "unlock protective stop" => {
             if controller.safety == Safety::Protective {
                 controller.safety = Safety::Normal;

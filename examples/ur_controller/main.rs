@@ -4,9 +4,8 @@
 //!     [--payload KG,X,Y,Z]
 //!
 //! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses and watches is modelled, not
-//! copied. Lines on stdin make faults: drop, undash, silent, deaf, stuck, unplug, die, protective, operator, release,
-//! halt, off, local, spike N, mend, mark TEXT. It
-//! ends when stdin does.
+//! copied. Lines on stdin make faults: drop, undash, mute, silent, deaf, stuck, hung, pause, resume, open, shut, unplug, die,
+//! protective, operator, release, halt, off, local, spike N, mend, mark TEXT. It ends when stdin does.
 //!
 //! It has a clock of its own, in lock step with its client: while a program of the client plays, a period passes when the client has
 //! sent its next order, so a machine that is late changes nothing. No period is shorter than on a robot; without a program the clock
@@ -169,6 +168,19 @@ fn fail(controller: &mut Controller, line: &str) {
         ["silent"] => controller.faults.is_silent = true,
         ["deaf"] => controller.faults.is_deaf = true,
         ["stuck"] => controller.faults.is_stuck = true,
+        ["hung"] => controller.faults.is_hung = true,
+        ["mute"] => controller.faults.is_mute = true,
+        ["pause"] => controller.pause("at the panel"),
+        ["resume"] => controller.resume(),
+        ["open"] => {
+            controller.safety = Safety::Safeguard;
+            controller.pause("a door is open");
+        }
+        // with the automatic resume that a cell may have
+        ["shut"] => {
+            controller.safety = Safety::Normal;
+            controller.resume();
+        }
         ["undash"] => controller.cut(&[DASHBOARD]),
         ["unplug"] => controller.faults.is_unplugged = true,
         ["die"] => {

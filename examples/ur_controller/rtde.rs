@@ -43,6 +43,7 @@ pub struct States {
     raw: [f64; 6],
     safety_bits: u32,
     is_playing: bool,
+    is_paused: bool,
     ints: [i32; 48],
     doubles: [f64; 48],
 }
@@ -63,9 +64,11 @@ impl States {
             safety_bits: match controller.safety {
                 Safety::Normal => 1,
                 Safety::Protective => 1 << 2 | 1 << 10,
+                Safety::Safeguard => 1 << 4 | 1 << 10,
                 Safety::Emergency => 1 << 6 | 1 << 7 | 1 << 10,
             },
             is_playing: controller.is_playing(),
+            is_paused: controller.is_paused(),
             ints: controller.ints_out,
             doubles: controller.doubles_out,
         }
@@ -85,6 +88,7 @@ impl States {
             "ft_raw_wrench" => six(&self.raw),
             "safety_status_bits" => unsigned(self.safety_bits),
             "robot_status_bits" => unsigned(1 | u32::from(self.is_playing) << 1),
+            "runtime_state" if self.is_paused => unsigned(4),
             "runtime_state" => unsigned(if self.is_playing { 2 } else { 1 }),
             "robot_mode" => ("INT32", 7i32.to_be_bytes().to_vec()),
             _ => match (register("output_int_register_"), register("output_double_register_")) {

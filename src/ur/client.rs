@@ -111,7 +111,7 @@ impl Client {
             return Err(broken.error());
         }
         if has_ended(&known) {
-            return Err(ArmError::ProgramEnded);
+            return Err(known.ended());
         }
         let silent_ms = deadline.as_millis() as u64;
         known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
@@ -128,7 +128,7 @@ impl Client {
         if let Some(broken) = &known.broken {
             return Err(broken.error());
         }
-        let number = known.send(what == Action::Zero, self.shared.clock.now());
+        let number = known.send(&what, self.shared.clock.now());
         drop(known);
         let sent = match &mut self.orders {
             Some(orders) => line_of(&Order { number, what }).and_then(|line| orders.write_all(&line)),

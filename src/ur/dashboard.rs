@@ -74,7 +74,11 @@ impl Dashboard {
     /// Stops the program of the controller, and the arm with it.
     pub fn stop(&mut self) -> Result<(), UrError> {
         let answer = self.ask("stop")?;
-        if answer == "Stopped" { Ok(()) } else { Err(self.unreachable(format!("`stop` was answered by `{answer}`"))) }
+        // one that has ended already cannot be stopped
+        if answer == "Stopped" || self.ask("programState")?.starts_with("STOPPED") {
+            return Ok(());
+        }
+        Err(self.unreachable(format!("`stop` was answered by `{answer}`")))
     }
 
     /// Whether the controller takes orders from outside.

@@ -1,7 +1,8 @@
 //! Waits for each line of the client with a deadline.
 //!
-//! When one stays away the guard kills the client, so that nothing feeds the arm any more, and stops the arm by the dashboard; then it
-//! says why.
+//! When one stays away, or the arm does not do what it is ordered to, the guard kills the client, so that nothing feeds the arm any
+//! more, and stops the arm by the dashboard; then it says why. A program that somebody else has paused it ends by the dashboard, so that
+//! nothing of an old order is left when it is resumed.
 
 use std::collections::VecDeque;
 use std::process::Child;
@@ -10,8 +11,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::dashboard::Dashboard;
+use super::obedience::Obedience;
 use super::params::Deadlines;
-use super::protocol::{ClientReport, Link, UrState};
+use super::protocol::{Action, ClientReport, Link, ProgramState, UrState};
 use crate::clock::{Clock, ManualClock};
 use crate::probing::arm::{ArmError, Safety};
 
@@ -52,8 +54,13 @@ pub(super) struct GuardState {
     asked: Option<u64>,
     /// when the last new state came
     fresh_at: Option<Instant>,
-    /// since when the program of the controller does not run
+    /// since when the program of the controller does not run, though nothing of the safety system says why
     ended_since: Option<Instant>,
+    /// whether it was paused before
+    was_paused: bool,
+    /// whether a state has said since it was ready that something stops the arm or its program
+    has_halted: bool,
+    obedience: Obedience,
     pub broken: Option<ClientLoss>,
     /// since when it is asked to end
     closing_since: Option<Instant>,
@@ -114,18 +121,20 @@ impl GuardState {
             asked: None,
             fresh_at: None,
             ended_since: None,
+            was_paused: false,
+            has_halted: false,
+            obedience: Obedience::new(now),
             broken: None,
             closing_since: None,
         }
     }
 
     /// An order goes out; returns its number.
-    ///
-    /// - `takes_time`: it zeroes the sensor, after braking.
-    pub fn send(&mut self, takes_time: bool, now: Instant) -> u64 {
+    pub fn send(&mut self, what: &Action, now: Instant) -> u64 {
         self.sent += 1;
         self.waiting_since.get_or_insert(now);
-        if takes_time {
+        self.obedience.order(what, now);
+        if *what == Action::Zero {
             self.asked = Some(self.sent);
         }
         self.sent
@@ -139,6 +148,19 @@ impl GuardState {
     /// Whether the program of the controller does not run, for long enough that the reason would have arrived.
     pub fn has_ended(&self, now: Instant) -> bool {
         self.ended_since.is_some_and(|since| now.saturating_duration_since(since) > ENDED)
+    }
+
+    /// Why it does not.
+    pub fn ended(&self) -> ArmError {
+        if self.was_paused { ArmError::ProgramPaused } else { ArmError::ProgramEnded }
+    }
+
+    /// Notes a state of a client that is ready; whether it is the first in which something else stops a program that is still there.
+    fn is_to_be_ended(&mut self, state: &UrState) -> bool {
+        let is_first = self.is_ready && !state.may_move() && !self.has_halted;
+        self.has_halted |= is_first;
+        self.was_paused |= is_first && state.program == ProgramState::Paused;
+        is_first && state.program != ProgramState::Ended && self.closing_since.is_none()
     }
 
     /// How long the next line may stay away from now on.
@@ -173,13 +195,18 @@ impl GuardState {
             ClientReport::State(state) => {
                 self.fresh_at = Some(now);
                 // where the safety system has ended it, the state says so by itself
-                let has_ended = !state.is_playing && state.safety() == Safety::Normal;
+                let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
                 self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
                 if self.states.len() == WAITING {
                     self.states.pop_front();
                 }
                 self.states.push_back(*state);
                 self.serve(state.served, now);
+                // what does not play is somebody else's, or stands
+                let disobeys = self.is_ready && !self.has_halted && state.may_move();
+                if let Some(fault) = disobeys.then(|| self.obedience.see(&state.velocity, now)).flatten() {
+                    return Some(ClientLoss::Arm(fault));
+                }
             }
             ClientReport::Beat { served } => self.serve(served, now),
             ClientReport::Done { number } => {
@@ -246,8 +273,18 @@ impl Guard {
                         hand.advance(Duration::try_from_secs_f64(state.stamp_s - stamp_s).unwrap_or_default());
                         stamp_s = state.stamp_s;
                     }
-                    let broken = self.shared.known().take(report, clock.now());
+                    let mut known = self.shared.known();
+                    let is_to_be_ended = matches!(&report, ClientReport::State(state) if known.is_to_be_ended(state));
+                    let broken = known.take(report, clock.now());
+                    drop(known);
                     self.shared.changed.notify_all();
+                    if is_to_be_ended {
+                        let halt = self.halt();
+                        tracing::warn!(
+                            ?halt,
+                            "something stopped the arm: its program is ended, so that nothing goes on by itself"
+                        );
+                    }
                     broken
                 }
                 // it ended on request

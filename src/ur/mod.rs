@@ -12,6 +12,7 @@ mod client;
 mod dashboard;
 mod error;
 mod guard;
+mod obedience;
 mod params;
 mod probe;
 mod protocol;

@@ -94,10 +94,21 @@ pub struct UrState {
     pub joints: [f64; 6],
     /// as the controller has them
     pub safety_bits: u32,
-    /// whether the uploaded program runs
-    pub is_playing: bool,
+    /// what of the uploaded program
+    pub program: ProgramState,
     /// number of the last order whose calls have returned
     pub served: u64,
+}
+
+/// What the program of the controller does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ProgramState {
+    /// It runs.
+    Playing,
+    /// It is paused, or on its way there or back: the next to resume it has it go on with what it did.
+    Paused,
+    /// There is none.
+    Ended,
 }
 
 /// Bits of `safety_status_bits`, as the RTDE guide has them: violation, fault, and recovery, which takes a panel.
@@ -108,6 +119,21 @@ const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
 const PROTECTIVE_BITS: u32 = 1 << 2 | 1 << 10;
 
 impl UrState {
+    /// Whether it does what it is ordered to.
+    pub fn is_playing(&self) -> bool {
+        self.program == ProgramState::Playing
+    }
+
+    /// Whether nothing is in the way of an order.
+    pub fn may_move(&self) -> bool {
+        self.is_playing() && self.safety() == Safety::Normal
+    }
+
+    /// Norm of its velocity, m/s and rad/s together.
+    pub fn speed(&self) -> f64 {
+        self.velocity.iter().map(|part| part * part).sum::<f64>().sqrt()
+    }
+
     /// Meaning of the bits of the safety system; the gravest counts.
     pub fn safety(&self) -> Safety {
         match self.safety_bits {
@@ -155,7 +181,7 @@ pub(super) mod tests {
         raw_wrench: [2.0 / 3.0; 6],
         joints: [3.0; 6],
         safety_bits: 1,
-        is_playing: true,
+        program: ProgramState::Playing,
         served: 7,
     };
 

@@ -1,7 +1,9 @@
 //! The one thread that commands the arm.
 //!
-//! It moves only while orders come: when they stay away it brakes, and then feeds the watchdog of the controller for as long as it
-//! lives. A thread that hangs in a call feeds nothing, and the arm is stopped by that watchdog.
+//! It moves only while orders come: when they stay away it brakes, and so it does when a call fails. That the arm is at rest it takes
+//! from the states, and only then it feeds the watchdog of the controller, for as long as it lives and sees the arm stand. A thread
+//! that hangs in a call feeds nothing, and the arm is stopped by that watchdog. Once something has stopped the arm or its program, no
+//! order moves it any more: that takes a new client.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -11,12 +13,14 @@ use super::error::{ChildError, failure};
 use super::library::Control;
 use super::shared::ChildShared;
 use crate::clock::Clock;
-use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order};
+use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order, UrState};
 
 /// Time without an order after which it acts by itself.
 const TURN: Duration = Duration::from_millis(5);
-/// Orders that stay away for this long leave the arm to brake.
-const FRESH: Duration = Duration::from_millis(60);
+/// Orders that stay away for this long leave the arm to brake: ten of its periods.
+const FRESH: Duration = Duration::from_millis(20);
+/// A state that is older tells nothing of now.
+const SEEN: Duration = Duration::from_millis(20);
 /// With which it brakes then, m/s².
 const BRAKE: f64 = 2.0;
 /// The watchdog of the controller stops the arm when nothing has come for the tenth of a second.
@@ -25,6 +29,8 @@ const WATCHDOG_HZ: f64 = 10.0;
 const FEED: Duration = Duration::from_millis(20);
 /// The tip counts as at rest below this speed, m/s and rad/s; what is left a hard stop takes.
 const AT_REST: f64 = 1e-3;
+/// An arm that is at rest and yet goes faster than this is moved by somebody else, m/s and rad/s.
+const STANDS: f64 = 5e-3;
 /// Longest time from an order to the states that show its effect.
 const REST_TIME: Duration = Duration::from_millis(20);
 /// The hard stop of `speedStop`, m/s².
@@ -47,10 +53,22 @@ const SAME_TOOL: f64 = 1e-6;
 /// The current motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doing {
+    /// seen, not assumed
     Resting,
     Moving,
-    Pressing { frame: [f64; 6], force: f64, speed: f64 },
-    Braking { deceleration: f64, since: Instant },
+    Braking {
+        deceleration: f64,
+        since: Instant,
+    },
+}
+
+/// Force mode, as it was asked for: whether it is there is not known when that call failed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ForceMode {
+    /// turn of its frame: the axis, not the place, is what makes it another press
+    turn: [f64; 3],
+    force: f64,
+    speed: f64,
 }
 
 /// Why a driver ends before its orders do.
@@ -68,6 +86,7 @@ pub struct Driver<'a, C> {
     begin: &'a Begin,
     clock: Clock,
     doing: Doing,
+    force_mode: Option<ForceMode>,
     ordered: Instant,
     fed: Instant,
     pressed: Instant,
@@ -77,12 +96,14 @@ impl<'a, C: Control> Driver<'a, C> {
     /// - `clock`: on which all that is kept in time is kept.
     pub fn new(control: &'a C, shared: &'a ChildShared, begin: &'a Begin, clock: Clock) -> Self {
         let now = clock.now();
-        Self { control, shared, begin, clock, doing: Doing::Resting, ordered: now, fed: now, pressed: now }
+        let (doing, force_mode) = (Doing::Resting, None);
+        Self { control, shared, begin, clock, doing, force_mode, ordered: now, fed: now, pressed: now }
     }
 
     /// Until the orders end.
     pub fn run(mut self, orders: &Receiver<Order>) -> Result<(), DriverEnd> {
         self.prepare()?;
+        self.shared.is_ready.store(true, Ordering::Release);
         self.shared.report(&ClientReport::Ready);
         loop {
             self.check_connection()?;
@@ -118,20 +139,24 @@ impl<'a, C: Control> Driver<'a, C> {
 
     fn serve(&mut self, what: &Action) -> Result<(), ChildError> {
         match *what {
+            // what was stopped is not set going again, whoever resumes it
+            Action::Move { .. } | Action::Press { .. } if self.shared.has_halted.load(Ordering::Acquire) => {
+                self.brake(BRAKE)
+            }
             Action::Move { twist, acceleration } => {
-                self.end_press()?;
                 self.doing = Doing::Moving;
+                self.end_press()?;
                 self.control.speed(twist, acceleration)
             }
             Action::Press { frame, force_n, speed, feed: [x, y, z], acceleration } => {
-                let doing = Doing::Pressing { frame, force: force_n, speed };
-                // the axis, not the place, is what makes it another press
-                let is_same = matches!(self.doing, Doing::Pressing { frame: [.., a, b, c], force, speed: most }
-                    if [a, b, c] == frame[3..] && force == force_n && most == speed);
-                if !is_same || self.clock.since(self.pressed) > REPEAT {
+                let [.., a, b, c] = frame;
+                let force_mode = Some(ForceMode { turn: [a, b, c], force: force_n, speed });
+                self.doing = Doing::Moving;
+                if self.force_mode != force_mode || self.clock.since(self.pressed) > REPEAT {
                     let [far, turned] = ASIDE;
+                    self.force_mode = force_mode;
                     self.control.press(frame, force_n, FIXED_FRAME, [far, far, speed, turned, turned, turned])?;
-                    (self.doing, self.pressed) = (doing, self.clock.now());
+                    self.pressed = self.clock.now();
                     self.clock.sleep(CYCLES);
                 }
                 self.control.speed([x, y, z, 0.0, 0.0, 0.0], acceleration)
@@ -178,13 +203,20 @@ impl<'a, C: Control> Driver<'a, C> {
             Doing::Resting if self.clock.since(self.fed) >= FEED => self.feed(),
             Doing::Resting => Ok(()),
             Doing::Braking { deceleration, .. } => self.brake(deceleration),
-            Doing::Moving | Doing::Pressing { .. } if self.clock.since(self.ordered) > FRESH => self.brake(BRAKE),
-            Doing::Moving | Doing::Pressing { .. } => Ok(()),
+            Doing::Moving if self.clock.since(self.ordered) > FRESH => self.brake(BRAKE),
+            Doing::Moving => Ok(()),
         }
     }
 
+    /// The last state, when it is of now.
+    fn seen(&self) -> Option<UrState> {
+        self.shared.latest().filter(|latest| self.clock.since(latest.at) <= SEEN).map(|latest| latest.state)
+    }
+
+    /// Nothing is fed that was not just seen to stand, at our command.
     fn feed(&mut self) -> Result<(), ChildError> {
-        if !self.control.is_running() {
+        let stands = self.seen().is_some_and(|state| state.may_move() && state.speed() < STANDS);
+        if !stands || self.shared.has_halted.load(Ordering::Acquire) || !self.control.is_running() {
             return Ok(());
         }
         self.fed = self.clock.now();
@@ -194,15 +226,20 @@ impl<'a, C: Control> Driver<'a, C> {
     /// One turn of braking: the velocity goes to zero with the deceleration, and what is left by a hard stop. At rest the controller
     /// hears that there was an order.
     fn brake(&mut self, deceleration: f64) -> Result<(), ChildError> {
-        self.end_press()?;
-        if self.doing == Doing::Resting {
+        if self.doing == Doing::Resting && self.force_mode.is_none() {
             return self.feed();
         }
         let since = if let Doing::Braking { since, .. } = self.doing { since } else { self.clock.now() };
+        // before any call: one that fails leaves it braking
         self.doing = Doing::Braking { deceleration, since };
+        let state = self.seen();
+        // a program that is paused hears nothing; the arm is braked as soon as it is resumed
+        if state.is_some_and(|state| !state.is_playing()) {
+            return Ok(());
+        }
+        self.end_press()?;
         self.control.speed([0.0; 6], deceleration)?;
-        let speed = |velocity: [f64; 6]| velocity.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let is_at_rest = self.shared.latest().is_some_and(|state| speed(state.velocity) < AT_REST);
+        let is_at_rest = state.is_some_and(|state| state.speed() < AT_REST);
         // the first states may still be those of an arm that has not begun to move
         if is_at_rest && self.clock.since(since) > REST_TIME {
             self.control.hard_stop(HARD)?;
@@ -213,10 +250,10 @@ impl<'a, C: Control> Driver<'a, C> {
 
     /// The feed is stopped first: the thread that drives it outlives the end of force mode.
     fn end_press(&mut self) -> Result<(), ChildError> {
-        if matches!(self.doing, Doing::Pressing { .. }) {
+        if self.force_mode.is_some() {
             self.control.hard_stop(HARD)?;
             self.control.end_press()?;
-            self.doing = Doing::Resting;
+            self.force_mode = None;
         }
         Ok(())
     }
@@ -228,16 +265,19 @@ impl<'a, C: Control> Driver<'a, C> {
             self.brake(BRAKE)?;
             self.clock.sleep(TURN);
         }
-        Ok(())
+        if self.doing == Doing::Resting { Ok(()) } else { Err(ChildError::Moves { after: UPLOAD }) }
     }
 
-    /// A call was refused. When the program has ended or the arm is not allowed to move, the states say so.
+    /// A call was refused. When the program has ended or the arm is not allowed to move, the states say so; and the arm may still do
+    /// what it was ordered before, so it is braked until it is seen at rest.
     fn failed(&mut self, error: &ChildError) -> Result<(), DriverEnd> {
-        self.doing = Doing::Resting;
         let begun = self.clock.now();
+        if self.doing == Doing::Moving {
+            self.doing = Doing::Braking { deceleration: BRAKE, since: begun };
+        }
         while self.clock.since(begun) < EXCUSE {
             self.check_connection()?;
-            if self.shared.latest().is_some_and(|state| !state.is_playing) {
+            if self.shared.latest().is_some_and(|latest| !latest.state.may_move()) {
                 return Ok(());
             }
             self.clock.sleep(TURN);
@@ -249,7 +289,8 @@ impl<'a, C: Control> Driver<'a, C> {
     /// Orders have ended.
     fn end(&mut self) {
         // what fails here the watchdog does
-        let _ = self.rest().and_then(|()| self.control.end_program());
+        let _ = self.rest();
+        let _ = self.control.end_program();
     }
 }
 

@@ -1,5 +1,7 @@
 //! Errors of the process, and how they are reported.
 
+use std::time::Duration;
+
 use crate::ur::protocol::ClientReport;
 
 /// Why the process gives up before it has begun.
@@ -8,6 +10,12 @@ pub enum ChildError {
     /// It is started by touchup, with its orders on stdin.
     #[error("this is started by touchup itself: the first line on stdin has to be an order to begin ({0})")]
     NoOrders(String),
+    /// The arm does not come to rest.
+    #[error("the arm still moves after braking for {} s", after.as_secs())]
+    Moves {
+        /// that it was braked
+        after: Duration,
+    },
     /// A call of Python.
     #[error("{call}: {reason}")]
     Python {
@@ -25,5 +33,6 @@ pub fn failure(error: &ChildError) -> ClientReport {
             ClientReport::Failed { call: (*call).to_owned(), reason: reason.clone() }
         }
         ChildError::NoOrders(reason) => ClientReport::Failed { call: "the orders".to_owned(), reason: reason.clone() },
+        ChildError::Moves { .. } => ClientReport::Failed { call: "braking".to_owned(), reason: error.to_string() },
     }
 }

@@ -9,7 +9,7 @@ use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
 use super::error::ChildError;
-use crate::ur::protocol::{UrState, WHEEL};
+use crate::ur::protocol::{ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
 const RATE_HZ: f64 = 500.0;
@@ -28,8 +28,9 @@ const VARIABLES: [&str; 9] = [
     "runtime_state",
     "robot_status_bits",
 ];
-/// Of `runtime_state`: the program runs.
+/// Of `runtime_state`, as the RTDE guide has it: the program runs; it pauses, is paused, resumes.
 const PLAYING: u32 = 2;
+const PAUSED: std::ops::RangeInclusive<u32> = 3..=5;
 /// Readings of one state that may fall into the coming of the next.
 const TORN_READS: usize = 3;
 
@@ -104,7 +105,11 @@ impl Receive {
                     raw_wrench: read("getFtRawWrench")?.extract(py)?,
                     joints: read("getActualQ")?.extract(py)?,
                     safety_bits: read("getSafetyStatusBits")?.extract(py)?,
-                    is_playing: read("getRuntimeState")?.extract::<u32>(py)? == PLAYING,
+                    program: match read("getRuntimeState")?.extract::<u32>(py)? {
+                        PLAYING => ProgramState::Playing,
+                        state if PAUSED.contains(&state) => ProgramState::Paused,
+                        _ => ProgramState::Ended,
+                    },
                     served,
                 };
                 // the next one may have come between two of these calls

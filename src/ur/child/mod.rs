@@ -12,8 +12,6 @@ mod states;
 
 use std::io::{BufRead, BufReader, stdin, stdout};
 use std::os::fd::AsFd;
-use std::sync::Mutex;
-use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::channel;
 use std::thread;
 
@@ -36,8 +34,7 @@ pub fn run() -> Result<(), ChildError> {
     let first = lines.next().unwrap_or_default();
     let begin: Begin = serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
     let reports = stdout().as_fd().try_clone_to_owned().map_err(|error| ChildError::NoOrders(error.to_string()))?;
-    let shared =
-        ChildShared { reports: Mutex::new(reports.into()), served: AtomicU64::new(0), latest: Mutex::new(None) };
+    let shared = ChildShared::new(reports.into());
     if let Err(error) = library::load(&begin.site_packages) {
         shared.report(&ClientReport::BadWheel { reason: error.to_string() });
         return Err(error);
@@ -49,13 +46,13 @@ pub fn run() -> Result<(), ChildError> {
     let (clock, hand) = begin.is_lock_step.then(Clock::manual).unzip();
     let clock = clock.unwrap_or_else(Clock::system);
     thread::scope(|scope| {
-        scope.spawn(|| states::hand_on(&receive, &shared, hand.as_ref()));
+        scope.spawn(|| states::hand_on(&receive, &shared, &clock, hand.as_ref()));
         scope.spawn(move || {
             let mut orders = lines.filter_map(|line| serde_json::from_str::<Order>(&line).ok());
             // until nobody takes them any more
             let _ = orders.try_for_each(|order| sender.send(order));
         });
-        match Driver::new(&control, &shared, &begin, clock).run(&orders) {
+        match Driver::new(&control, &shared, &begin, clock.clone()).run(&orders) {
             Ok(()) => leave(0),
             Err(DriverEnd::Lost(which)) => shared.lost(which),
             Err(DriverEnd::BadTool(reason)) => {

@@ -1,18 +1,30 @@
 //! What the threads have in common.
 
 use std::io::{PipeWriter, Write};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 use super::library::leave;
 use crate::ur::protocol::{ClientReport, Link, UrState};
+
+/// The newest state, and when it came.
+#[derive(Clone, Copy, Debug)]
+pub struct Latest {
+    pub state: UrState,
+    pub at: Instant,
+}
 
 /// Shared by the threads.
 pub struct ChildShared {
     pub reports: Mutex<PipeWriter>,
     /// number of the last order whose calls have returned
     pub served: AtomicU64,
-    pub latest: Mutex<Option<UrState>>,
+    pub latest: Mutex<Option<Latest>>,
+    /// the arm is at our command
+    pub is_ready: AtomicBool,
+    /// since then a state has said that something stops the arm or its program
+    pub has_halted: AtomicBool,
 }
 
 impl ChildShared {
@@ -23,8 +35,26 @@ impl ChildShared {
         let _ = self.reports.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
     }
 
-    pub fn latest(&self) -> Option<UrState> {
+    pub fn new(reports: PipeWriter) -> Self {
+        Self {
+            reports: Mutex::new(reports),
+            served: AtomicU64::new(0),
+            latest: Mutex::new(None),
+            is_ready: AtomicBool::new(false),
+            has_halted: AtomicBool::new(false),
+        }
+    }
+
+    pub fn latest(&self) -> Option<Latest> {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A state has come.
+    pub fn see(&self, state: UrState, at: Instant) {
+        *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Latest { state, at });
+        if self.is_ready.load(Ordering::Acquire) && !state.may_move() {
+            self.has_halted.store(true, Ordering::Release);
+        }
     }
 
     /// Reports a lost connection, and ends the process.

@@ -1,6 +1,5 @@
 //! Passes on each state of the arm once, and a heartbeat where none comes.
 
-use std::sync::PoisonError;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,23 +15,23 @@ const BEAT: Duration = Duration::from_millis(10);
 
 /// Until the connection is lost.
 ///
-/// - `hand`: of the clock that follows the controller.
-pub fn hand_on(receive: &Receive, shared: &ChildShared, hand: Option<&ManualClock>) -> ! {
+/// - `clock`: of the driver; `hand`: that moves it, where it follows the controller.
+pub fn hand_on(receive: &Receive, shared: &ChildShared, clock: &Clock, hand: Option<&ManualClock>) -> ! {
     // the heartbeat of this process follows the time of this machine
-    let clock = Clock::system();
-    let mut last = LastReport { stamp_s: f64::INFINITY, at: clock.now() };
+    let machine = Clock::system();
+    let mut last = LastReport { stamp_s: f64::INFINITY, at: machine.now() };
     loop {
         if !receive.is_connected() {
             shared.lost(Link::States);
         }
         let state = receive.stamp().filter(|stamp| last.is_new(*stamp)).and_then(|_| receive.state(shared.number()));
         if let Some(state) = state {
-            *shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(state);
-            if let Some(hand) = hand {
-                hand.advance(Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default());
-            }
+            let passed = hand.map(|_| Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default());
+            shared.see(state, clock.now() + passed.unwrap_or_default());
+            // who waits finds it there
+            hand.zip(passed).iter().for_each(|(hand, passed)| hand.advance(*passed));
         }
-        if let Some(report) = last.next(state, shared.number(), clock.now()) {
+        if let Some(report) = last.next(state, shared.number(), machine.now()) {
             shared.report(&report);
         }
         thread::sleep(LOOK);

@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 
 use super::*;
 use crate::ur::dashboard::tests::listen;
+use crate::ur::protocol::ProgramState::{Ended, Paused, Playing};
 use crate::ur::protocol::tests::STATE;
 
 const MS: Duration = Duration::from_millis(1);
@@ -45,9 +46,11 @@ impl GuardBench {
     }
 }
 
-fn state(is_playing: bool, safety_bits: u32, served: u64) -> ClientReport {
-    ClientReport::State(Box::new(UrState { is_playing, safety_bits, served, ..STATE }))
+fn state(program: ProgramState, safety_bits: u32, served: u64) -> ClientReport {
+    ClientReport::State(Box::new(UrState { program, safety_bits, served, ..STATE }))
 }
+
+const UP: Action = Action::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
 
 #[test]
 fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
@@ -70,52 +73,52 @@ fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
 fn states_that_stay_away_for_more_than_80_ms_are_a_lost_arm() {
     let mut bench = GuardBench::ready();
     bench.hand.advance(50 * MS);
-    assert_eq!(bench.take(state(true, 1, 0)), None);
+    assert_eq!(bench.take(state(Playing, 1, 0)), None);
     let broken = bench.until_broken(&ClientReport::Beat { served: 0 });
     assert_eq!(broken, (81, ClientLoss::Arm(ArmError::Lost { silent_ms: 81 })));
 }
 
 #[test]
-fn a_call_that_does_not_return_for_more_than_200_ms_is_a_hanging_client() {
+fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
     let mut bench = GuardBench::ready();
-    assert_eq!(bench.known.send(false, bench.clock.now()), 1);
-    bench.hand.advance(150 * MS);
-    assert_eq!(bench.known.send(false, bench.clock.now()), 2);
+    assert_eq!(bench.known.send(&UP, bench.clock.now()), 1);
+    bench.hand.advance(100 * MS);
+    assert_eq!(bench.known.send(&UP, bench.clock.now()), 2);
     // the first has returned: the time of the second begins
-    assert_eq!(bench.take(state(true, 1, 1)), None);
-    let broken = bench.until_broken(&state(true, 1, 1));
+    assert_eq!(bench.take(state(Playing, 1, 1)), None);
+    let broken = bench.until_broken(&state(Playing, 1, 1));
     let hangs = |ms| ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {ms} ms"));
-    assert_eq!(broken, (201, hangs(201)));
+    assert_eq!(broken, (121, hangs(121)));
     // no running call, no deadline
-    assert_eq!(bench.take(state(true, 1, 2)), None);
+    assert_eq!(bench.take(state(Playing, 1, 2)), None);
     bench.hand.advance(5_000 * MS);
-    assert_eq!(bench.take(state(true, 1, 2)), None);
-    // zeroing has three seconds, and what comes after it 200 ms again
-    assert_eq!(bench.known.send(true, bench.clock.now()), 3);
-    assert_eq!(bench.until_broken(&state(true, 1, 2)), (3_001, hangs(3_001)));
+    assert_eq!(bench.take(state(Playing, 1, 2)), None);
+    // zeroing has three seconds, and what comes after it 120 ms again
+    assert_eq!(bench.known.send(&Action::Zero, bench.clock.now()), 3);
+    assert_eq!(bench.until_broken(&state(Playing, 1, 2)), (3_001, hangs(3_001)));
     assert_eq!(bench.take(ClientReport::Done { number: 3 }), None);
     assert_eq!(bench.known.done, 3);
-    bench.known.send(false, bench.clock.now());
-    assert_eq!(bench.until_broken(&state(true, 1, 3)), (201, hangs(201)));
+    bench.known.send(&UP, bench.clock.now());
+    assert_eq!(bench.until_broken(&state(Playing, 1, 3)), (121, hangs(121)));
 }
 
 #[test]
 fn a_program_that_has_ended_is_reported_after_40_ms_unless_the_state_gives_the_reason() {
     let mut bench = GuardBench::ready();
     let has_ended = |bench: &GuardBench| bench.known.has_ended(bench.clock.now());
-    bench.take(state(false, 1, 0));
+    bench.take(state(Ended, 1, 0));
     bench.hand.advance(40 * MS);
-    bench.take(state(false, 1, 0));
+    bench.take(state(Ended, 1, 0));
     assert!(!has_ended(&bench));
     bench.hand.advance(MS);
     assert!(has_ended(&bench));
     // a protective stop
-    bench.take(state(false, 1 << 2, 0));
+    bench.take(state(Ended, 1 << 2, 0));
     assert!(!has_ended(&bench));
-    bench.take(state(false, 1, 0));
+    bench.take(state(Ended, 1, 0));
     bench.hand.advance(30 * MS);
     // it runs again
-    bench.take(state(true, 1, 0));
+    bench.take(state(Playing, 1, 0));
     bench.hand.advance(30 * MS);
     assert!(!has_ended(&bench));
 }
@@ -125,7 +128,7 @@ fn a_client_that_is_asked_to_end_has_a_second_and_a_half() {
     let mut bench = GuardBench::ready();
     bench.known.close(bench.clock.now());
     bench.hand.advance(1_499 * MS);
-    bench.take(state(true, 1, 0));
+    bench.take(state(Playing, 1, 0));
     assert_eq!(bench.known.patience(bench.clock.now()), MS);
     bench.hand.advance(MS);
     assert_eq!(bench.known.patience(bench.clock.now()), Duration::ZERO);
@@ -136,7 +139,7 @@ fn a_client_that_is_asked_to_end_has_a_second_and_a_half() {
 fn untaken_states_are_the_newest_64() {
     let mut bench = GuardBench::ready();
     for served in 0..100 {
-        bench.take(state(true, 1, served));
+        bench.take(state(Playing, 1, served));
     }
     let served: Vec<u64> = bench.known.states.iter().map(|state| state.served).collect();
     assert_eq!(served, (36..100).collect::<Vec<_>>());
@@ -299,4 +302,68 @@ fn a_dashboard_that_was_closed_is_connected_again_to_stop_the_arm() {
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
     assert_eq!(broken, Some(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" })));
+}
+
+fn moving(speed: f64, served: u64) -> ClientReport {
+    ClientReport::State(Box::new(UrState { velocity: [0.0, 0.0, speed, 0.0, 0.0, 0.0], served, ..STATE }))
+}
+
+/// Every call returns, every line comes, and the arm goes on.
+#[test]
+fn an_arm_that_does_not_do_what_it_is_ordered_to_is_stopped_by_the_dashboard() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    for _ in 0..100 {
+        let number = watch.shared.known().send(&UP, watch.shared.clock.now());
+        watch.hand.advance(2 * MS);
+        watch.say(moving(20e-3, number));
+    }
+    let stop = Action::Stop { deceleration: 1.0 };
+    let mut after = 0;
+    while !watch.guard.is_finished() && after < 1000 {
+        let number = watch.shared.known().send(&stop, watch.shared.clock.now());
+        watch.hand.advance(2 * MS);
+        after += 2;
+        let begun = watch.hand.begun();
+        let _ = watch.reports.send(moving(20e-3, number));
+        while watch.hand.begun() == begun && !watch.guard.is_finished() {
+            thread::yield_now();
+        }
+    }
+    let (halt, broken, asked) = watch.end();
+    assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
+    assert!(matches!(broken, Some(ClientLoss::Arm(ArmError::Disobeys { .. }))), "{broken:?}");
+    assert!((100..=130).contains(&after), "{after} ms");
+}
+
+/// Whoever resumes it finds nothing to go on with.
+#[test]
+fn a_program_that_somebody_pauses_is_ended_once() {
+    for stopped in [state(Paused, 1, 0), state(Paused, 1 << 4, 0), state(Playing, 1 << 2, 0)] {
+        let watch = Watch::begin(1);
+        watch.say(ClientReport::Ready);
+        watch.say(state(Playing, 1, 0));
+        for _ in 0..5 {
+            watch.say(stopped.clone());
+        }
+        assert_eq!(watch.asked.recv(), Ok("stop".to_owned()));
+        watch.say(state(Ended, 1, 0));
+        watch.hand.advance(41 * MS);
+        let reason = watch.shared.known().ended();
+        let was_paused = matches!(&stopped, ClientReport::State(state) if state.program == Paused);
+        assert_eq!(reason, if was_paused { ArmError::ProgramPaused } else { ArmError::ProgramEnded });
+        assert!(watch.asked.try_recv().is_err() && watch.shared.known().broken.is_none());
+        watch.shared.known().close(watch.shared.clock.now());
+        let Watch { guard, reports, .. } = watch;
+        drop(reports);
+        guard.join().unwrap();
+    }
+}
+
+#[test]
+fn a_program_that_has_ended_by_itself_is_not_stopped_again() {
+    let watch = Watch::begin(1);
+    watch.say(ClientReport::Ready);
+    watch.say(state(Ended, 1 << 2, 0));
+    watch.is_calm_after(MS);
 }

@@ -170,10 +170,12 @@ fn stopped(error: &ProbeError) -> u8 {
     match error {
         ProbeError::Arm { error, .. } => match error {
             ArmError::Lost { .. } | ArmError::Dropped { .. } | ArmError::ProgramEnded => ProbeResult::LINK_LOST,
+            // most often a door
+            ArmError::ProgramPaused => ProbeResult::OPERATOR_STOP,
             ArmError::Stale => ProbeResult::DATA_LOST,
             ArmError::Stopped { safety: Safety::OperatorStop } => ProbeResult::OPERATOR_STOP,
             ArmError::Stopped { .. } => ProbeResult::PROTECTIVE_STOP,
-            ArmError::Client { .. } => ProbeResult::DRIVER_LOST,
+            ArmError::Client { .. } | ArmError::Disobeys { .. } => ProbeResult::DRIVER_LOST,
             ArmError::Refused { .. } => ProbeResult::FAULT,
         },
         ProbeError::Limit { error: LimitError::Force { .. }, .. } => ProbeResult::FORCE_OVER_LIMIT,

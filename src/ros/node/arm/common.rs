@@ -71,7 +71,8 @@ impl Common {
     /// None came; whether that is new.
     pub fn miss(&self, error: &ArmError) -> bool {
         let mut seen = locked(&self.seen);
-        if let ArmError::Stopped { .. } | ArmError::ProgramEnded | ArmError::Client { .. } = error {
+        use ArmError::{Client, Disobeys, ProgramEnded, ProgramPaused, Stopped};
+        if let Stopped { .. } | ProgramEnded | ProgramPaused | Disobeys { .. } | Client { .. } = error {
             seen.stop.get_or_insert_with(|| error.to_string());
         }
         seen.fault.replace(error.to_string()).is_none()

@@ -2,20 +2,24 @@
 
 use std::cell::{Cell, RefCell};
 use std::io::{PipeReader, Read, pipe};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::channel;
 use std::thread;
 
 use self::LibraryCall::{EndPress, EndProgram, Feed, HardStop, Press, Set, Speed, Zero};
 use super::*;
 use crate::clock::ManualClock;
-use crate::ur::protocol::UrState;
+use crate::ur::protocol::ProgramState::{self, Ended, Paused, Playing};
 use crate::ur::protocol::tests::STATE;
 
 const MS: Duration = Duration::from_millis(1);
 const UP: Action = Action::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
 const GOING_UP: LibraryCall = Speed(20e-3, 1.0);
+
+fn press(angle: f64, force_n: f64) -> Action {
+    let frame = [0.0, 0.0, 0.0, angle, 0.0, 0.0];
+    Action::Press { frame, force_n, speed: 5e-3, feed: [0.0, 0.0, 1e-3], acceleration: 0.5 }
+}
 
 /// A call of the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,6 +120,11 @@ impl Control for Fake {
     }
 }
 
+fn see_again(shared: &ChildShared, clock: &Clock) {
+    let state = shared.latest().unwrap().state;
+    shared.see(state, clock.now());
+}
+
 struct ControlBench {
     hand: ManualClock,
     fake: Fake,
@@ -139,8 +148,8 @@ impl ControlBench {
             tool: Cell::new(tool),
         };
         let (reports, writer) = pipe().unwrap();
-        let shared =
-            ChildShared { reports: Mutex::new(writer), served: AtomicU64::new(0), latest: Mutex::new(Some(STATE)) };
+        let shared = ChildShared::new(writer);
+        shared.see(STATE, fake.begun);
         let begin = Begin {
             host: String::new(),
             site_packages: Default::default(),
@@ -158,20 +167,27 @@ impl ControlBench {
         Driver::new(&self.fake, &self.shared, &self.begin, self.fake.clock.clone())
     }
 
-    /// The state says that the tip goes up, m/s.
-    fn goes(&self, speed: f64, is_playing: bool) {
+    /// The state says from now on that the tip goes up, m/s.
+    fn goes(&self, speed: f64, program: ProgramState) {
         let velocity = [0.0, 0.0, speed, 0.0, 0.0, 0.0];
-        *self.shared.latest.lock().unwrap() = Some(UrState { velocity, is_playing, ..STATE });
+        self.shared.see(UrState { velocity, program, ..STATE }, self.fake.clock.now());
+    }
+
+    /// The state comes again, as it was.
+    fn see_again(&self) {
+        see_again(&self.shared, &self.fake.clock);
     }
 
     /// Does something in which time passes as it is slept.
     fn sleeping<T>(&self, work: impl FnOnce() -> T) -> T {
         let (is_over, hand) = (AtomicBool::new(false), &self.hand);
+        let (shared, clock) = (&self.shared, &self.fake.clock);
         thread::scope(|scope| {
             scope.spawn(|| {
                 while !is_over.load(Ordering::Acquire) {
                     if hand.waiting() > 0 {
                         hand.advance(MS);
+                        see_again(shared, clock);
                     }
                     thread::yield_now();
                 }
@@ -186,11 +202,13 @@ impl ControlBench {
     fn without_orders(&self, driver: &mut Driver<'_, Fake>, ms: u32) {
         for _ in 0..ms / 5 {
             self.hand.advance(TURN);
+            self.see_again();
             self.sleeping(|| driver.turn(None)).unwrap();
         }
     }
 
     fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: Action) {
+        self.see_again();
         self.sleeping(|| driver.turn(Some(Order { number, what }))).unwrap();
     }
 
@@ -209,46 +227,46 @@ impl ControlBench {
 }
 
 #[test]
-fn orders_that_stay_away_for_60_ms_leave_the_arm_to_brake_and_then_it_is_fed() {
+fn orders_that_stay_away_for_20_ms_leave_the_arm_to_brake_and_then_it_is_fed() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
-    bench.goes(20e-3, true);
+    bench.goes(20e-3, Playing);
     bench.order(&mut driver, 1, UP);
     assert_eq!(bench.shared.number(), 1);
     assert_eq!(bench.calls(), [(0, GOING_UP)]);
-    bench.without_orders(&mut driver, 60);
+    bench.without_orders(&mut driver, 20);
     assert_eq!(bench.calls(), [], "not a moment before");
     bench.without_orders(&mut driver, 10);
-    assert_eq!(bench.calls(), [65, 70].map(|ms| (ms, Speed(0.0, 2.0))));
-    bench.goes(0.0, true);
+    assert_eq!(bench.calls(), [25, 30].map(|ms| (ms, Speed(0.0, 2.0))));
+    bench.goes(0.0, Playing);
     bench.without_orders(&mut driver, 100);
-    let braking = [75, 80, 85, 90].map(|ms| (ms, Speed(0.0, 2.0)));
-    let resting = [(95, Feed), (115, Feed), (135, Feed), (155, Feed)];
-    assert_eq!(bench.calls(), [&braking[..], &[(90, HardStop(10.0))], &resting].concat());
+    let braking = [35, 40, 45, 50].map(|ms| (ms, Speed(0.0, 2.0)));
+    let resting = [(55, Feed), (75, Feed), (95, Feed), (115, Feed)];
+    assert_eq!(bench.calls(), [&braking[..], &[(50, HardStop(10.0))], &resting].concat());
 }
 
 #[test]
 fn an_arm_that_does_not_stand_is_braked_on_and_on_and_never_fed() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
-    bench.goes(20e-3, true);
+    bench.goes(20e-3, Playing);
     bench.order(&mut driver, 1, UP);
     bench.without_orders(&mut driver, 1000);
     let calls = bench.calls();
     assert!(calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)), "{calls:?}");
-    assert_eq!(calls.len(), 1 + (1000 - 60) / 5);
+    assert_eq!(calls.len(), 1 + (1000 - 20) / 5);
 }
 
 #[test]
 fn orders_that_come_in_time_keep_it_going() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
-    bench.goes(20e-3, true);
+    bench.goes(20e-3, Playing);
     for number in 0..10 {
         bench.order(&mut driver, number, UP);
-        bench.without_orders(&mut driver, 60);
+        bench.without_orders(&mut driver, 20);
     }
-    assert_eq!(bench.calls(), std::array::from_fn::<_, 10, _>(|at| (60 * at as u128, GOING_UP)));
+    assert_eq!(bench.calls(), std::array::from_fn::<_, 10, _>(|at| (20 * at as u128, GOING_UP)));
 }
 
 #[test]
@@ -284,7 +302,7 @@ fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_late
     let mut driver = bench.driver();
     bench.order(&mut driver, 1, UP);
     // the states do not show yet that it moves
-    bench.goes(0.0, true);
+    bench.goes(0.0, Playing);
     bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
     bench.without_orders(&mut driver, 30);
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 0.5)));
@@ -293,13 +311,6 @@ fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_late
 
 #[test]
 fn a_press_has_two_cycles_for_itself_and_is_repeated_after_100_ms() {
-    let press = |angle: f64, force_n: f64| Action::Press {
-        frame: [0.0, 0.0, 0.0, angle, 0.0, 0.0],
-        force_n,
-        speed: 5e-3,
-        feed: [0.0, 0.0, 1e-3],
-        acceleration: 0.5,
-    };
     let feed = Speed(1e-3, 0.5);
     let bench = ControlBench::new();
     let mut driver = bench.driver();
@@ -321,10 +332,10 @@ fn a_press_has_two_cycles_for_itself_and_is_repeated_after_100_ms() {
 
 #[test]
 fn a_refused_call_is_reported_after_40_ms_without_a_state_of_an_ended_program() {
-    for (is_playing, ends_at, expected) in [(true, 40, 1), (false, 0, 0)] {
+    for (program, ends_at, expected) in [(Playing, 40, 1), (Paused, 0, 0), (Ended, 0, 0)] {
         let bench = ControlBench::new();
         let mut driver = bench.driver();
-        bench.goes(0.0, is_playing);
+        bench.goes(0.0, program);
         bench.fake.refuses.set(true);
         bench.order(&mut driver, 1, UP);
         assert_eq!(bench.fake.clock.since(bench.fake.begun), ends_at * MS);
@@ -362,7 +373,7 @@ fn where_orders_end_it_brakes_and_ends_the_program() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.order(&mut driver, 1, UP);
-    bench.goes(0.0, true);
+    bench.goes(0.0, Playing);
     bench.sleeping(|| driver.end());
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 2.0)));
     let end = [(25, HardStop(10.0)), (30, EndProgram)];
@@ -377,4 +388,90 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     }
     assert_eq!(newest(Order { number: 1, what: UP }, &orders).number, 3);
     assert_eq!(newest(orders.recv().unwrap(), &orders).number, 5);
+}
+
+/// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the old velocity.
+#[test]
+fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.shared.is_ready.store(true, Ordering::Release);
+    bench.goes(40e-3, Playing);
+    bench.order(&mut driver, 1, UP);
+    // the call fails before any state says why
+    bench.fake.refuses.set(true);
+    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
+    bench.goes(0.0, Paused);
+    bench.calls();
+    bench.without_orders(&mut driver, 2_000);
+    assert_eq!(bench.calls(), [], "a program that is paused hears nothing, and is not fed");
+    bench.fake.refuses.set(false);
+    bench.goes(40e-3, Playing);
+    bench.without_orders(&mut driver, 50);
+    let calls = bench.calls();
+    assert_eq!(calls[0].1, Speed(0.0, 0.5), "at once: {calls:?}");
+    assert!(calls.iter().all(|(_, call)| *call == Speed(0.0, 0.5)), "{calls:?}");
+    bench.goes(0.0, Playing);
+    bench.without_orders(&mut driver, 500);
+    let calls = bench.calls();
+    assert!(calls.contains(&(calls[0].0, Speed(0.0, 0.5))) && calls.last().unwrap().1 == HardStop(10.0), "{calls:?}");
+}
+
+#[test]
+fn once_something_has_stopped_it_no_order_moves_it() {
+    let protective = UrState { safety_bits: 1 << 2, ..STATE };
+    for stopped in [UrState { program: Paused, ..STATE }, UrState { program: Ended, ..STATE }, protective] {
+        let bench = ControlBench::new();
+        let mut driver = bench.driver();
+        bench.shared.is_ready.store(true, Ordering::Release);
+        bench.shared.see(stopped, bench.fake.clock.now());
+        bench.goes(0.0, Playing);
+        bench.order(&mut driver, 1, UP);
+        bench.order(&mut driver, 2, press(0.0, 5.0));
+        bench.without_orders(&mut driver, 200);
+        assert_eq!(bench.calls(), [], "{stopped:?}");
+    }
+}
+
+#[test]
+fn force_mode_is_ended_also_where_the_call_that_began_it_failed() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.goes(2e-3, Playing);
+    bench.fake.refuses.set(true);
+    bench.order(&mut driver, 1, press(0.0, 5.0));
+    bench.fake.refuses.set(false);
+    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
+    let calls: Vec<_> = bench.calls().into_iter().map(|(_, call)| call).collect();
+    assert_eq!(calls, [Press(0.0, 5.0), HardStop(10.0), EndPress, Speed(0.0, 0.5)]);
+}
+
+#[test]
+fn an_arm_that_is_not_seen_to_stand_is_not_fed() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    // moved by somebody else
+    bench.goes(10e-3, Playing);
+    bench.without_orders(&mut driver, 100);
+    // no state comes any more
+    bench.goes(0.0, Playing);
+    for _ in 0..20 {
+        bench.hand.advance(TURN);
+        driver.turn(None).unwrap();
+    }
+    assert_eq!(bench.calls(), [5, 10, 15, 20].map(|_| (105, Feed))[..1]);
+}
+
+#[test]
+fn a_sensor_is_not_zeroed_on_an_arm_that_does_not_come_to_rest() {
+    let bench = ControlBench::new();
+    let mut driver = bench.driver();
+    bench.goes(20e-3, Playing);
+    bench.order(&mut driver, 1, UP);
+    bench.order(&mut driver, 2, Action::Zero);
+    let calls = bench.calls();
+    assert!(calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)), "{calls:?}");
+    assert!(
+        matches!(&bench.reports()[..], [ClientReport::Failed { reason, .. }] if reason.contains("after braking for 5 s"))
+    );
 }

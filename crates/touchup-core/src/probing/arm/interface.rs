@@ -109,6 +109,25 @@ pub enum ArmError {
         "the program on the arm's controller has ended, at its panel, by its watchdog or by another client: look, then recover"
     )]
     ProgramEnded,
+    /// What it runs for us was paused; it was ended then, so that nothing goes on when somebody resumes it.
+    #[error(
+        "the program on the arm's controller was paused, at its panel or by a safeguard, and ended then, so that nothing goes on by \
+         itself: look, then recover"
+    )]
+    ProgramPaused,
+    /// It does not do what it is ordered to; it was stopped by other means.
+    #[error(
+        "the arm moves with {mm_per_s:.0} mm/s and {deg_per_s:.0}°/s where {ordered_mm_per_s:.0} mm/s are ordered: its program hangs, or \
+         somebody else commands it; it was stopped: look, then recover"
+    )]
+    Disobeys {
+        /// of the tip, mm/s
+        mm_per_s: f64,
+        /// by the order, mm/s
+        ordered_mm_per_s: f64,
+        /// of its turning, °/s
+        deg_per_s: f64,
+    },
     /// The connection to the arm has failed; the arm was stopped by other means.
     #[error("the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover")]
     Client {

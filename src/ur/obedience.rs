@@ -1,0 +1,254 @@
+//! Compares the velocity of the arm with what was ordered.
+//!
+//! A program that hangs while the thread of its motion lives takes orders that nobody reads: every call returns, the watchdog is fed,
+//! and the arm goes on. Only its velocity tells.
+//!
+//! The ordered velocity is followed by one without mass or delay: towards the target of the newest order with the acceleration that the
+//! order allows. An arm is late, by a time that no two arms share, but goes through the same velocities; so what it does now was
+//! ordered within the last [`WINDOW`], or is slower than that. While it presses, the velocity along the axis is its own, up to
+//! the speed that force mode has.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::protocol::{Action, pose_of};
+use crate::probing::arm::ArmError;
+
+/// An arm is at most this late.
+const WINDOW: Duration = Duration::from_millis(80);
+/// It disobeys when it does so for longer than this: a contact that springs back is over sooner.
+const LASTING: Duration = Duration::from_millis(20);
+/// It may be faster than ordered by this share …
+const SHARE: f64 = 0.2;
+/// … and by this, m/s: what its velocity is measured with, and a tip that springs.
+const NOISE: f64 = 5e-3;
+/// It may turn faster than ordered by this, rad/s.
+const TURN_NOISE: f64 = 50e-3;
+/// Turning is braked by whatever the controller has: what was ordered within this time is no disobedience.
+const TURN_WINDOW: Duration = Duration::from_millis(300);
+/// Force mode may be faster than it is set by this factor.
+const PRESS: f64 = 1.5;
+/// Deceleration of an arm that is to zero its sensor, m/s²: its driver brakes so.
+const REST: f64 = 2.0;
+
+/// A velocity that was ordered once.
+#[derive(Clone, Copy, Debug)]
+struct Ordered {
+    at: Instant,
+    /// m/s in B
+    linear: Vector3<f64>,
+    /// rad/s
+    turn: f64,
+    /// axis in B, and the speed of force mode along it, m/s
+    press: Option<(Vector3<f64>, f64)>,
+}
+
+/// What was ordered lately.
+#[derive(Debug)]
+pub(super) struct Obedience {
+    /// the newest last; what it would do by now without mass and delay
+    ordered: VecDeque<Ordered>,
+    target: Vector3<f64>,
+    /// m/s²
+    acceleration: f64,
+    since: Option<Instant>,
+}
+
+impl Obedience {
+    /// Of an arm at rest.
+    pub fn new(now: Instant) -> Self {
+        let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None };
+        Self { ordered: VecDeque::from([rest]), target: Vector3::zeros(), acceleration: REST, since: None }
+    }
+
+    /// An order goes out.
+    pub fn order(&mut self, what: &Action, now: Instant) {
+        self.follow(now);
+        let (target, turn, acceleration, press) = match *what {
+            Action::Move { twist: [x, y, z, a, b, c], acceleration } => {
+                (Vector3::new(x, y, z), Vector3::new(a, b, c).norm(), acceleration, None)
+            }
+            Action::Press { frame, speed, feed, acceleration, .. } => {
+                let axis: Isometry3<f64> = pose_of(frame);
+                (Vector3::from(feed), 0.0, acceleration, Some((axis.rotation * Vector3::z(), speed)))
+            }
+            Action::Stop { deceleration } => (Vector3::zeros(), 0.0, deceleration, None),
+            Action::Zero => (Vector3::zeros(), 0.0, REST, None),
+        };
+        (self.target, self.acceleration) = (target, acceleration);
+        let linear = self.newest().linear;
+        self.push(Ordered { at: now, linear, turn, press });
+    }
+
+    fn newest(&self) -> Ordered {
+        // there is always one
+        self.ordered[self.ordered.len() - 1]
+    }
+
+    /// The ordered velocity goes on until now.
+    fn follow(&mut self, now: Instant) {
+        let last = self.newest();
+        let room = self.acceleration * now.saturating_duration_since(last.at).as_secs_f64();
+        let linear = last.linear + (self.target - last.linear).cap_magnitude(room);
+        self.push(Ordered { at: now, linear, ..last });
+    }
+
+    fn push(&mut self, ordered: Ordered) {
+        self.ordered.push_back(ordered);
+        // one that is older is kept: it was in force when the time began
+        while self.ordered.get(1).is_some_and(|next| ordered.at.saturating_duration_since(next.at) > TURN_WINDOW) {
+            self.ordered.pop_front();
+        }
+    }
+
+    /// A state of the arm; returns the fault of one that does not do what it is ordered to.
+    ///
+    /// - `velocity`: m/s and rad/s in B.
+    pub fn see(&mut self, velocity: &[f64; 6], now: Instant) -> Option<ArmError> {
+        self.follow(now);
+        let [x, y, z, a, b, c] = *velocity;
+        let (linear, turn) = (Vector3::new(x, y, z), Vector3::new(a, b, c).norm());
+        let recent = |window| {
+            let begin = self.ordered.iter().rposition(|one| now.saturating_duration_since(one.at) > window);
+            self.ordered.iter().skip(begin.unwrap_or(0))
+        };
+        let is_ordered = recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
+        let most_turn = recent(TURN_WINDOW).map(|one| one.turn).fold(0.0, f64::max);
+        if is_ordered && turn <= most_turn * (1.0 + SHARE) + TURN_NOISE {
+            self.since = None;
+            return None;
+        }
+        let since = *self.since.get_or_insert(now);
+        let ordered_mm_per_s = self.newest().linear.norm() * 1e3;
+        (now.saturating_duration_since(since) > LASTING).then(|| ArmError::Disobeys {
+            mm_per_s: linear.norm() * 1e3,
+            ordered_mm_per_s,
+            deg_per_s: turn.to_degrees(),
+        })
+    }
+}
+
+impl Ordered {
+    /// How far a velocity is from one between rest and this, m/s.
+    fn beyond(&self, velocity: &Vector3<f64>) -> f64 {
+        let mut off = velocity - self.linear;
+        let mut own = *velocity;
+        if let Some((axis, speed)) = &self.press {
+            let along = velocity.dot(axis);
+            let free = along.clamp(-PRESS * speed, PRESS * speed);
+            (off, own) = (off - axis * free, own - axis * free);
+        }
+        let squared = self.linear.norm_squared();
+        if squared > 0.0 {
+            let share = (own.dot(&self.linear) / squared).clamp(0.0, 1.0);
+            off = own - self.linear * share;
+        }
+        off.norm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    fn along(speed: f64) -> [f64; 6] {
+        [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    fn go(speed: f64) -> Action {
+        Action::Move { twist: along(speed), acceleration: 0.5 }
+    }
+
+    const STOP: Action = Action::Stop { deceleration: 0.5 };
+
+    /// An order and a state each 2 ms; when the first fault is seen, ms.
+    fn first_fault(ms: u32, order: impl Fn(u32) -> Action, velocity: impl Fn(u32) -> [f64; 6]) -> Option<u32> {
+        let begun = Instant::now();
+        let mut obedience = Obedience::new(begun);
+        (0..ms).step_by(2).find(|&at| {
+            let now = begun + at * MS;
+            let fault = obedience.see(&velocity(at), now);
+            obedience.order(&order(at), now);
+            fault.is_some()
+        })
+    }
+
+    /// Speed of an arm that reaches 50 mm/s with 0.5 m/s² from 0 ms on and brakes from 200 ms on, late by some time, m/s.
+    fn late(at: u32, by: u32) -> f64 {
+        let at = f64::from(at.saturating_sub(by)) * 1e-3;
+        (0.5 * at).min(0.05).min((0.05 - 0.5 * (at - 0.2)).max(0.0))
+    }
+
+    #[test]
+    fn an_arm_that_is_late_by_up_to_80_ms_obeys() {
+        let order = |at| if at < 200 { go(0.05) } else { STOP };
+        for by in [0, 10, 40, 80] {
+            assert_eq!(first_fault(800, order, |at| along(late(at, by))), None, "late by {by} ms");
+        }
+        // braked sooner and harder than ordered, as when the client brakes by itself
+        assert_eq!(first_fault(800, order, |at| along(if at < 150 { late(at, 10) } else { 0.0 })), None);
+    }
+
+    /// From 50 to 35 mm/s, which is as much as it may be off, are 30 ms; then the 80 ms that it may be late, and the 20 ms.
+    #[test]
+    fn an_arm_that_goes_on_after_a_stop_is_seen_within_140_ms() {
+        let order = |at| if at < 200 { go(0.05) } else { STOP };
+        let seen = first_fault(800, order, |at| along(late(at.min(200), 0))).unwrap();
+        assert!((300..=340).contains(&seen), "{seen} ms");
+    }
+
+    #[test]
+    fn an_arm_that_moves_without_an_order_is_seen_after_20_ms() {
+        assert_eq!(first_fault(400, |_| STOP, |at| along(if at < 200 { 0.0 } else { 8e-3 })), Some(222));
+        assert_eq!(first_fault(400, |_| STOP, |_| along(4e-3)), None, "the noise of its velocity");
+    }
+
+    #[test]
+    fn an_arm_that_goes_elsewhere_as_fast_as_ordered_disobeys() {
+        let aside = |at: u32| [0.0, late(at.min(200), 0), 0.0, 0.0, 0.0, 0.0];
+        assert!(first_fault(400, |_| go(0.05), aside).is_some());
+        assert!(first_fault(400, |_| go(0.05), |at| along(-late(at.min(200), 0))).is_some());
+        // a bend of the way by a right angle is none: it goes through what was ordered
+        let bend = |at| {
+            if at < 200 { go(0.05) } else { Action::Move { twist: [0.0, 0.05, 0.0, 0.0, 0.0, 0.0], acceleration: 0.5 } }
+        };
+        let bent = |at: u32| {
+            let share = (f64::from(at.saturating_sub(220)) * 1e-3 / 0.1414).min(1.0);
+            [late(at.min(200), 20) * (1.0 - share), 0.05 * share, 0.0, 0.0, 0.0, 0.0]
+        };
+        assert_eq!(first_fault(600, bend, bent), None);
+    }
+
+    #[test]
+    fn a_turn_that_nobody_ordered_is_seen() {
+        let turning = |at: u32| [0.0, 0.0, 0.0, 0.0, 0.0, if at < 100 { 0.0 } else { 0.1 }];
+        assert_eq!(first_fault(400, |_| STOP, turning), Some(122));
+        let order = |at| {
+            let turn = if at < 100 { 0.5 } else { 0.0 };
+            Action::Move { twist: [0.0, 0.0, 0.0, 0.0, 0.0, turn], acceleration: 0.5 }
+        };
+        let braked = |at: u32| [0.0, 0.0, 0.0, 0.0, 0.0, if at < 250 { 0.5 } else { 0.0 }];
+        assert_eq!(first_fault(800, order, braked), None);
+        assert!(first_fault(800, order, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]).is_some_and(|at| at < 450));
+    }
+
+    /// The frame of a press whose z is along −x of B.
+    fn press(feed: [f64; 3]) -> Action {
+        let frame = [0.0, 0.0, 0.0, 0.0, -std::f64::consts::FRAC_PI_2, 0.0];
+        Action::Press { frame, force_n: 3.0, speed: 10e-3, feed, acceleration: 0.5 }
+    }
+
+    #[test]
+    fn along_the_axis_of_a_press_the_arm_has_its_own_velocity_up_to_the_speed_of_it() {
+        let of = |along: f64, across: f64| move |_| [along, across, 0.0, 0.0, 0.0, 0.0];
+        let feed = |_| press([0.0, 10e-3, 0.0]);
+        assert_eq!(first_fault(400, feed, of(-10e-3, 5e-3)), None);
+        assert_eq!(first_fault(400, feed, of(12e-3, 5e-3)), None);
+        assert!(first_fault(400, feed, of(40e-3, 5e-3)).is_some());
+        assert!(first_fault(400, feed, of(0.0, 40e-3)).is_some());
+    }
+}
