@@ -263,8 +263,8 @@ impl<'a> SimArm<'a> {
             self.waiting.clear();
         }
         let (wanted, acceleration) = self.wanted();
-        let most =
-            acceleration.min(if self.safety == Safety::Normal { self.params.top_acceleration } else { HARD_STOP });
+        let is_stop = matches!(self.doing, Command::Stop { .. });
+        let most = acceleration.min(if is_stop { HARD_STOP } else { self.params.top_acceleration });
         self.velocity += (wanted.cap_magnitude(self.params.top_speed) - self.velocity).cap_magnitude(most * STEP);
         if self.velocity.norm() > 0.0 {
             self.moved_at = self.time;

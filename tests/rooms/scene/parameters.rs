@@ -77,6 +77,8 @@ robot.measure_mm_per_s mm/s 2 0.05 250
 robot.slide_mm_per_s mm/s 10 0.1 250
 robot.largest_mm_per_s mm/s 100 0.1 250
 robot.acceleration_mm_per_s2 mm/s² 500 10 5000
+robot.fault_stop_mm_per_s2 mm/s² 5000 10 10000
+robot.largest_tare_n N 5 0.1 100
 robot.search_mm mm 15 0.5 100
 robot.latency_ms ms 20 0 200
 robot.time_s s 600 1 86400

@@ -183,7 +183,8 @@ fn stopped(error: &ProbeError) -> u8 {
         ProbeError::Obstacle { is_link: true, .. } => ProbeResult::UNEXPECTED_CONTACT,
         ProbeError::Obstacle { .. } => ProbeResult::EARLY_CONTACT,
         ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
-        ProbeError::TooLong { .. } => ProbeResult::FAULT,
+        ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => ProbeResult::UNEXPECTED_CONTACT,
+        ProbeError::TooLong { .. } | ProbeError::Pulls { .. } => ProbeResult::FAULT,
         ProbeError::Cancelled { .. } => ProbeResult::CANCELLED,
     }
 }

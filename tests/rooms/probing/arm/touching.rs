@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use touchup::features::{Feature, Kind, Measured};
 use touchup::probing::arm::{
     Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, Observer, OnsetVerdict, ProbeError, Safety,
-    StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, UrGeometry, Watched,
+    StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, UNEXPECTED, UrGeometry, Watched,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
@@ -231,6 +231,106 @@ fn an_obstacle_stops_it() {
     arm.advance(0.3);
     assert!(arm.peak_force() < limits().force);
     assert!(arm.time() - arm.at_rest_since() > 0.1);
+}
+
+/// However fast a link is asked for, and whether it leads to or from the part: what it meets is pressed with no more than the limit,
+/// and not pressed any more in the end.
+#[test]
+fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
+    let plate = Plate::default();
+    for (stiffness, leaves) in [(5e3, false), (15e3, false), (40e3, false), (15e3, true), (40e3, true)] {
+        let params = ArmParams { stiffness, ..ArmParams::default() };
+        let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 40e-3])).unwrap();
+        let touching = TouchParams { stiffness, link_speed: 0.25, ..TouchParams::default() };
+        let limits = Limits { speed: 0.25, ..limits() };
+        let mut world = Onlooker;
+        let mut watched = Watched::new(&mut arm, limits.clone(), &mut world);
+        watched.zero().unwrap();
+        let inside = at(&params, [45e-3, 8e-3, TOP - 5e-3]);
+        let met = match leaves {
+            true => watched.leave("retracting", &inside, touching.link_speed, &touching),
+            false => watched.line("going", &inside, touching.link_speed, &touching, UNEXPECTED * touching.trigger),
+        };
+        let Err(ProbeError::Obstacle { force_n, place_mm, .. }) = met else { panic!("{met:?}") };
+        let surface = (params.pose_bo * Point3::new(45e-3, 8e-3, TOP + params.radius)) * 1e3;
+        assert!((place_mm[2] - surface.z).abs() < 1.0, "{place_mm:?}");
+        println!("{stiffness} N/m: {:.1} N at most, told {force_n:.1} N", arm.peak_force());
+        assert!(arm.peak_force() < limits.force && force_n > 0.8 * arm.peak_force() - 0.5, "{force_n}");
+        arm.advance(0.3);
+        let left_n = arm.next_state().unwrap().wrench_b.force.norm();
+        assert!(left_n < 1.2 && arm.time() - arm.at_rest_since() > 0.25, "{left_n} N");
+    }
+}
+
+/// An arm whose states somebody changes.
+struct Altered<'a, F: FnMut(&mut ArmState)> {
+    arm: SimArm<'a>,
+    alter: F,
+}
+
+impl<F: FnMut(&mut ArmState)> Arm for Altered<'_, F> {
+    fn next_state(&mut self) -> Result<ArmState, ArmError> {
+        let mut state = self.arm.next_state()?;
+        (self.alter)(&mut state);
+        Ok(state)
+    }
+
+    fn command(&mut self, command: &Command) -> Result<(), ArmError> {
+        self.arm.command(command)
+    }
+
+    fn zero_sensor(&mut self) -> Result<(), ArmError> {
+        self.arm.zero_sensor()
+    }
+
+    fn recover(&mut self) -> Result<(), ArmError> {
+        self.arm.recover()
+    }
+
+    fn period(&self) -> f64 {
+        self.arm.period()
+    }
+}
+
+/// The first contact shows it, and it is not pressed after that.
+#[test]
+fn a_force_with_the_other_sign_is_named_at_the_first_contact() {
+    let (plate, params) = (Plate::default(), ArmParams::default());
+    let arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
+    let mut turned = Altered { arm, alter: |state: &mut ArmState| state.wrench_b.force *= -1.0 };
+    let mut world = Onlooker;
+    let mut watched = Watched::new(&mut turned, limits(), &mut world);
+    watched.zero().unwrap();
+    let error = watched.touch(&down(&params, [45e-3, 8e-3, TOP + 5e-3]), &TouchParams::default()).unwrap_err();
+    assert!(matches!(error, ProbeError::Pulls { .. }) && error.to_string().contains("sign"), "{error}");
+    turned.arm.advance(0.3);
+    let left_n = turned.next_state().unwrap().wrench_b.force.norm();
+    assert!(left_n < 1.2, "{left_n} N");
+    assert!(turned.arm.peak_force() < limits().force);
+}
+
+/// A sensor that is zeroed while something presses hides that force in every touch after it.
+#[test]
+fn a_sensor_that_feels_something_is_not_zeroed() {
+    let (plate, params) = (Plate::default(), ArmParams::default());
+    let free = at(&params, [45e-3, 8e-3, 30e-3]);
+    let mut world = Onlooker;
+    let alter = |state: &mut ArmState| state.wrench_b.force.z += 7.5;
+    let mut pressed = Altered { arm: SimArm::new(&plate, params, &free).unwrap(), alter };
+    let error = Watched::new(&mut pressed, limits(), &mut world).zero().unwrap_err();
+    assert!(matches!(error, ProbeError::Loaded { force_n, most_n: 5.0, .. } if force_n > 6.0), "{error}");
+    // somebody leans on it: 20 N/s
+    let arm = SimArm::new(&plate, params, &free).unwrap();
+    let alter = |state: &mut ArmState| state.wrench_b.force.x += 20.0 * (state.stamp_ns % 1_000_000_000) as f64 * 1e-9;
+    let mut leaned = Altered { arm, alter };
+    let error = Watched::new(&mut leaned, Limits { tare: 50.0, ..limits() }, &mut world).zero().unwrap_err();
+    assert!(matches!(error, ProbeError::Unsteady { change_n, .. } if change_n > 0.3), "{error}");
+    // a free one is, also with twice its noise
+    for seed in 0..50 {
+        let params = ArmParams { seed, force_noise: 0.3, ..params };
+        let mut arm = SimArm::new(&plate, params, &free).unwrap();
+        Watched::new(&mut arm, limits(), &mut world).zero().unwrap();
+    }
 }
 
 /// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported cause is the true one.

@@ -35,6 +35,15 @@ parameters! {
         ///
         /// Of the tip, m/s².
         acceleration: f64 = 500.0, "acceleration_mm_per_s2" [MM_PER_S2, 10, 5000];
+        /// Deceleration of a stop at a fault or at a contact that nobody expected; the least of it bounds every speed, so that the
+        /// force at such a contact stays below largest_force_n.
+        ///
+        /// Of the tip, m/s².
+        braking: f64 = 5000.0, "fault_stop_mm_per_s2" [MM_PER_S2, 10, 10000];
+        /// Force at rest, before zeroing, above which the sensor is not zeroed: the tip would touch something.
+        ///
+        /// In N.
+        tare: f64 = 5.0, "largest_tare_n" [N, 0.1, 100];
         /// Travel of one search at most.
         ///
         /// In m.

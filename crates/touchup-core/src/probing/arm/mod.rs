@@ -18,6 +18,6 @@ pub use kinematics::{Joints, UrGeometry};
 pub use limits::{LimitError, Limits, Narrower};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
 pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
-pub use touch_params::{CRAWL, TouchParams};
+pub use touch_params::{CRAWL, TouchParams, UNEXPECTED};
 pub use touching::{TouchOutcome, TouchRecord, TouchTarget};
 pub use watched::{Observer, ProbeError, StopRequest, Watched};

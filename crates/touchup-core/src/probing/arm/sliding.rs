@@ -193,7 +193,7 @@ impl Watched<'_> {
         // off the surface along its normal
         let leaving = "leaving the surface after a slide";
         self.halt(leaving, &mut |_| {})?;
-        self.line(leaving, &target.lifted(slid.station), params.safe_speed(), params, self.limits.force)?;
+        self.leave(leaving, &target.lifted(slid.station), params.safe_speed(), params)?;
         let mean = |forces: &[f64]| forces.iter().sum::<f64>() / forces.len().max(1) as f64;
         let worst = slid.forces.windows(window).map(|forces| (mean(forces) - params.force).abs()).fold(0.0, f64::max);
         Ok(SlideRecord {

@@ -77,11 +77,24 @@ impl TouchParams {
     ///
     /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a (√(τ² + 2 Δ/(k a)) − τ).
     pub(crate) fn safe_speed(&self) -> f64 {
-        let room = (self.force - self.trigger).max(0.0) / self.stiffness;
-        let (a, late) = (self.acceleration, self.latency);
-        (a * ((late * late + 2.0 * room / a).sqrt() - late)).min(self.search_speed).max(CRAWL)
+        self.speed_below(self.force - self.trigger, self.acceleration).min(self.search_speed).max(CRAWL)
+    }
+
+    /// Speed at which whatever the tip meets is pressed with no more than the largest force, where it stops as hard as it may once it
+    /// feels a contact; m/s.
+    pub(crate) fn bounded_speed(&self, limits: &Limits) -> f64 {
+        let braking = limits.braking.max(limits.acceleration);
+        self.speed_below(limits.force - UNEXPECTED * self.trigger, braking).min(limits.speed).max(CRAWL)
+    }
+
+    /// - `room`: by which the force may grow, N; `deceleration`: m/s².
+    fn speed_below(&self, room: f64, deceleration: f64) -> f64 {
+        let (way, late) = (room.max(0.0) / self.stiffness, self.latency);
+        deceleration * ((late * late + 2.0 * way / deceleration).sqrt() - late)
     }
 }
 
+/// In a fast move the sensor also measures accelerations: more force than this many triggers is a contact.
+pub const UNEXPECTED: f64 = 1.5;
 /// No search is slower, m/s: it would never end.
 pub const CRAWL: f64 = 0.1e-3;

@@ -8,9 +8,9 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use crate::numeric::mean;
 use crate::probing::plan::Expected;
 
-use super::interface::ArmState;
+use super::interface::{ArmState, Command};
 use super::onset::{Onset, OnsetError, TouchMoment, find_onset};
-use super::touch_params::TouchParams;
+use super::touch_params::{CRAWL, TouchParams};
 use super::watched::{ProbeError, TRIGGERS, Watched};
 
 /// A planned touch, in B.
@@ -113,7 +113,9 @@ impl Watched<'_> {
         let outcome = match outcome {
             Some(outcome) => outcome,
             None if is_contact || searched(self, "searching", travel - gone)? => {
-                self.halt("stopping at the surface", &mut |_| {})?;
+                let stopping = "stopping at the surface";
+                self.halt(stopping, &mut |_| {})?;
+                self.check_sign(stopping, &line)?;
                 let is_free = self.back_off(&line)?;
                 match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
                     true => line.outcome_of(&states),
@@ -131,7 +133,7 @@ impl Watched<'_> {
             }
         };
         // on the retraction the part may be in contact
-        self.line("retracting", &target.standoff_bt, params.link_speed, params, self.limits.force)?;
+        self.leave("retracting", &target.standoff_bt, params.link_speed, params)?;
         let ended = self.last.map_or(begun, |state| state.stamp_ns);
         Ok(TouchRecord {
             target: *target,
@@ -142,6 +144,18 @@ impl Watched<'_> {
             peak_force: self.peak_force,
             outcome,
         })
+    }
+
+    /// A part pushes: where it pulls, the force has the other sign.
+    fn check_sign(&mut self, doing: &'static str, line: &ApproachLine) -> Result<(), ProbeError> {
+        let Some(state) = self.last else { return Ok(()) };
+        let force_n = state.wrench_b.force.norm();
+        let pulls = force_n > line.params.trigger && -line.presses(&state) > PULLS * force_n;
+        if !pulls {
+            return Ok(());
+        }
+        self.come_free(&Command::Velocity { linear: line.along(CRAWL), acceleration: self.limits.acceleration })?;
+        Err(ProbeError::Pulls { doing, force_n })
     }
 
     /// Free of the surface again, then a little farther.
@@ -255,6 +269,8 @@ impl ApproachLine<'_> {
 /// A ball is stopped as well when its whole force is more than this many times the limit along its direction: a wall that it
 /// meets at 45° pushes √2 times as much.
 const ASIDE: f64 = 1.42;
+/// A contact that pulls by more than this share of its force has the wrong sign.
+const PULLS: f64 = 0.7;
 /// Where the surface is known to so many standard deviations it is not searched first …
 const KNOWN: f64 = 4.0;
 /// … as long as they leave no more room than this, over the back-off.

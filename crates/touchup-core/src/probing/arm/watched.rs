@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::interface::{Arm, ArmError, ArmState, Command, Safety};
 use super::limits::{LimitError, Limits};
-use super::touch_params::TouchParams;
+use super::touch_params::{TouchParams, UNEXPECTED};
 
 /// Why probing was broken off. The arm was commanded to stop before this was made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,15 +28,48 @@ pub enum ProbeError {
         /// which
         error: LimitError,
     },
-    /// An obstacle where the path should be clear.
-    #[error("while {doing}: {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the path is clear by the mesh; look what is there",
-            place_mm[0], place_mm[1], place_mm[2])]
-    Obstacle {
+    /// The sensor is not zeroed.
+    #[error(
+        "while {doing}: the sensor feels {force_n:.1} N at rest, and is zeroed below {most_n:.1} N only: free the tip, or tell the \
+         arm what it holds (`touchup calibrate payload`)"
+    )]
+    Loaded {
         /// what was being done
         doing: &'static str,
         /// N
         force_n: f64,
-        /// of the tip in B, mm
+        /// N
+        most_n: f64,
+    },
+    /// Nor where what it feels changes.
+    #[error(
+        "while {doing}: what the sensor feels at rest changes by {change_n:.1} N: something moves the tip, or its cable"
+    )]
+    Unsteady {
+        /// what was being done
+        doing: &'static str,
+        /// N
+        change_n: f64,
+    },
+    /// The part pulls.
+    #[error(
+        "while {doing}: the part pulls with {force_n:.1} N where it should push: the sign of the force is turned (docs/ur.md has the check)"
+    )]
+    Pulls {
+        /// what was being done
+        doing: &'static str,
+        /// N
+        force_n: f64,
+    },
+    /// An obstacle where the path should be clear.
+    #[error("while {doing}: up to {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the path is clear by the mesh; look what is there",
+            place_mm[0], place_mm[1], place_mm[2])]
+    Obstacle {
+        /// what was being done
+        doing: &'static str,
+        /// until the arm stood, N
+        force_n: f64,
+        /// of the tip in B, when it was felt, mm
         place_mm: [f64; 3],
         /// whether that was in a fast move through free air
         is_link: bool,
@@ -86,6 +119,18 @@ const TURNED: f64 = 2e-3;
 const TURN_SPEED: f64 = 0.2;
 /// Longer than it should take by this factor, and by this time (s), is too long.
 const PATIENCE: (f64, f64) = (3.0, 2.0);
+/// Below this the tip is free of what it met, N …
+const FREE_N: f64 = 1.0;
+/// … to which it goes back with this speed, m/s …
+const FREEING: f64 = 2e-3;
+/// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
+const FREEING_WAY: f64 = 5e-3;
+/// A sensor is looked at for so long before it is zeroed, s.
+const STEADY: f64 = 0.05;
+/// In which its mean may change by this, N …
+const DRIFT: f64 = 0.3;
+/// … and by this many of its standard deviations.
+const CHANGED: f64 = 4.0;
 /// Forces above the trigger in a row that are contact; one alone is noise.
 pub(super) const TRIGGERS: u32 = 2;
 
@@ -114,7 +159,7 @@ pub trait Observer {
 /// An arm that is watched while it moves.
 pub struct Watched<'a> {
     pub(super) arm: &'a mut dyn Arm,
-    pub(super) limits: Limits,
+    pub(crate) limits: Limits,
     observer: &'a mut dyn Observer,
     pub(super) last: Option<ArmState>,
     frozen: u32,
@@ -124,13 +169,15 @@ pub struct Watched<'a> {
     pub reached: Option<usize>,
     /// the least request that stops it: a retraction goes on unless it has to stay
     pub(crate) heeds: StopRequest,
+    /// whether it comes free of a contact: then no force stops it
+    comes_free: bool,
 }
 
 impl<'a> Watched<'a> {
     /// - `observer`: receives each state, and may stop it.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
         let (peak_force, heeds) = (0.0, StopRequest::Retract);
-        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, heeds }
+        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, heeds, comes_free: false }
     }
 
     /// The largest force of the current touch, or of all lines where there was none, N; and when the arm was seen last, by its clock, ns:
@@ -144,7 +191,7 @@ impl<'a> Watched<'a> {
         let result = self.look(doing);
         if result.is_err() {
             // stop first, report second; where no command gets through, its watchdog stops it
-            let _ = self.arm.command(&self.stop());
+            let _ = self.arm.command(&self.hard_stop());
         }
         result
     }
@@ -167,7 +214,10 @@ impl<'a> Watched<'a> {
             return Err(arm(ArmError::Stopped { safety: state.safety }));
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
-        self.limits.check_state(&state).map_err(|error| ProbeError::Limit { doing, error })?;
+        match self.limits.check_state(&state) {
+            Err(LimitError::Force { .. }) if self.comes_free => {}
+            checked => checked.map_err(|error| ProbeError::Limit { doing, error })?,
+        }
         match self.observer.stop_request().filter(|request| *request >= self.heeds) {
             Some(request) => Err(ProbeError::Cancelled { doing, request }),
             None => Ok(state),
@@ -176,6 +226,10 @@ impl<'a> Watched<'a> {
 
     fn stop(&self) -> Command {
         Command::Stop { deceleration: self.limits.acceleration }
+    }
+
+    fn hard_stop(&self) -> Command {
+        Command::Stop { deceleration: self.limits.braking.max(self.limits.acceleration) }
     }
 
     pub(super) fn send(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
@@ -195,7 +249,13 @@ impl<'a> Watched<'a> {
     ) -> Result<T, ProbeError> {
         loop {
             self.send(doing, command)?;
-            let state = self.next(doing)?;
+            let state = match self.next(doing) {
+                Err(error @ ProbeError::Limit { error: LimitError::Force { .. }, .. }) if !self.comes_free => {
+                    self.come_free(command)?;
+                    return Err(error);
+                }
+                next => next?,
+            };
             if let Some(result) = until(&state) {
                 return Ok(result);
             }
@@ -206,12 +266,36 @@ impl<'a> Watched<'a> {
         }
     }
 
+    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more.
+    ///
+    /// - `command`: that led to the contact.
+    pub(super) fn come_free(&mut self, command: &Command) -> Result<(), ProbeError> {
+        let (heeds, doing) = (self.heeds, "coming free of what it met");
+        (self.comes_free, self.heeds) = (true, StopRequest::Stay);
+        let met = self.last.map(|state| state.pose_bt.translation.vector);
+        let freed = self.stop_and_free(doing, met.and_then(|met| way_of(command, &met)));
+        (self.comes_free, self.heeds) = (false, heeds);
+        freed
+    }
+
+    fn stop_and_free(&mut self, doing: &'static str, way: Option<Vector3<f64>>) -> Result<(), ProbeError> {
+        self.stand(doing, &self.hard_stop(), &mut |_| {})?;
+        let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
+        let (Some(way), false) = (way, self.last.as_ref().is_none_or(is_free)) else { return Ok(()) };
+        let mut free = 0;
+        self.search(doing, way * -FREEING, FREEING_WAY, &mut |state| {
+            free = if is_free(state) { free + 1 } else { 0 };
+            free >= TRIGGERS
+        })?;
+        self.stand(doing, &self.stop(), &mut |_| {})
+    }
+
     /// Goes straight to a pose through what should be free air.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N).
+    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N): the arm has stopped, and come free of it.
     ///
-    /// - `speed`: m/s; near the part not above `TouchParams::safe_speed`.
+    /// - `speed`: m/s, at most; near the part not above `TouchParams::safe_speed`.
     pub fn line(
         &mut self,
         doing: &'static str,
@@ -220,40 +304,91 @@ impl<'a> Watched<'a> {
         params: &TouchParams,
         trigger: f64,
     ) -> Result<(), ProbeError> {
+        self.go(doing, to, speed, params, &mut |_| trigger)
+    }
+
+    /// As [`Self::line`], from where the tip may be in contact: once it is free, what it meets is an obstacle.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn leave(
+        &mut self,
+        doing: &'static str,
+        to: &Isometry3<f64>,
+        speed: f64,
+        params: &TouchParams,
+    ) -> Result<(), ProbeError> {
+        let (mut is_free, most) = (false, self.limits.force);
+        self.go(doing, to, speed, params, &mut |force| {
+            is_free |= force < params.trigger;
+            if is_free { (UNEXPECTED * params.trigger).min(most) } else { most }
+        })
+    }
+
+    /// - `trigger`: above which a force is an obstacle, N, where that much is felt now.
+    fn go(
+        &mut self,
+        doing: &'static str,
+        to: &Isometry3<f64>,
+        speed: f64,
+        params: &TouchParams,
+        trigger: &mut dyn FnMut(f64) -> f64,
+    ) -> Result<(), ProbeError> {
         let place = to.translation.vector;
         self.limits.check_place(&place).map_err(|error| ProbeError::Limit { doing, error })?;
         let begun = self.next(doing)?;
-        let speed = speed.min(self.limits.speed);
+        let speed = speed.min(params.bounded_speed(&self.limits));
         let acceleration = params.acceleration.min(self.limits.acceleration);
         let distance = (place - begun.pose_bt.translation.vector).norm();
         let turn = begun.pose_bt.rotation.angle_to(&to.rotation);
         let limit_s = PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
         let command = Command::Line { to: *to, speed, acceleration };
         let mut contacts = 0;
-        let obstacle = self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
+        let met = self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
             let here = state.pose_bt.translation.vector;
             let force_n = state.wrench_b.force.norm();
-            contacts = if force_n > trigger { contacts + 1 } else { 0 };
+            contacts = if force_n > trigger(force_n) { contacts + 1 } else { 0 };
             if contacts >= TRIGGERS {
-                let (place_mm, is_link) = ((here * 1e3).into(), speed > params.safe_speed());
-                return Some(Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link }));
+                return Some(Some(here));
             }
             let turn = state.pose_bt.rotation.angle_to(&to.rotation);
-            ((here - place).norm() < THERE && turn < TURNED).then_some(Ok(()))
+            ((here - place).norm() < THERE && turn < TURNED).then_some(None)
         })?;
-        if obstacle.is_err() {
-            self.send(doing, &self.stop())?;
-        }
-        obstacle
+        let Some(here) = met else { return Ok(()) };
+        let before = std::mem::take(&mut self.peak_force);
+        self.come_free(&command)?;
+        let force_n = self.peak_force;
+        self.peak_force = before.max(force_n);
+        let (place_mm, is_link) = ((here * 1e3).into(), speed > params.safe_speed());
+        Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link })
     }
 
     /// Stops, waits until the arm is at rest, and zeroes the sensor.
     ///
     /// # Errors
-    /// [`ProbeError`]
+    /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] where it feels something.
     pub fn zero(&mut self) -> Result<(), ProbeError> {
+        self.zero_below(self.limits.tare)
+    }
+
+    /// As [`Self::zero`], of a sensor that may feel a weight.
+    ///
+    /// - `most_n`: N
+    pub(crate) fn zero_below(&mut self, most_n: f64) -> Result<(), ProbeError> {
         let doing = "zeroing the sensor in free air";
-        self.halt(doing, &mut |_| {})?;
+        let mut forces = Vec::new();
+        self.dwell(doing, STEADY, &mut |state| forces.push(state.wrench_b.force))?;
+        let mean = |forces: &[Vector3<f64>]| forces.iter().sum::<Vector3<f64>>() / forces.len().max(1) as f64;
+        let (all, (first, second)) = (mean(&forces), forces.split_at(forces.len() / 2));
+        let spread = forces.iter().map(|force| (force - all).norm_squared()).sum::<f64>() / forces.len().max(1) as f64;
+        let change_n = (mean(second) - mean(first)).norm();
+        if all.norm() > most_n {
+            return Err(ProbeError::Loaded { doing, force_n: all.norm(), most_n });
+        }
+        // of two means of n/2 with that spread in all three directions
+        if change_n > DRIFT + CHANGED * (spread * 4.0 / forces.len().max(1) as f64).sqrt() {
+            return Err(ProbeError::Unsteady { doing, change_n });
+        }
         self.arm.zero_sensor().map_err(|error| ProbeError::Arm { doing, error })?;
         // that took its time
         self.last = None;
@@ -284,9 +419,18 @@ impl<'a> Watched<'a> {
 
     /// Stops, and waits until the arm is at rest.
     pub(super) fn halt(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
+        self.stand(doing, &self.stop(), each)
+    }
+
+    fn stand(
+        &mut self,
+        doing: &'static str,
+        stop: &Command,
+        each: &mut dyn FnMut(&ArmState),
+    ) -> Result<(), ProbeError> {
         let limit_s = PATIENCE.0 * self.limits.speed / self.limits.acceleration + PATIENCE.1;
         let mut places = VecDeque::new();
-        self.repeat(doing, &self.stop(), None, limit_s, &mut |state| {
+        self.repeat(doing, stop, None, limit_s, &mut |state| {
             each(state);
             let place = state.pose_bt.translation.vector;
             places.push_back(place);
@@ -314,7 +458,18 @@ impl<'a> Watched<'a> {
     }
 
     pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
-        self.send(doing, &self.stop())?;
+        self.send(doing, &self.hard_stop())?;
         Err(ProbeError::TooLong { doing, limit_s })
     }
+}
+
+/// Where a command takes the tip from a place, unit vector in B; `None`: nowhere.
+fn way_of(command: &Command, from: &Vector3<f64>) -> Option<Vector3<f64>> {
+    match command {
+        Command::Line { to, .. } => to.translation.vector - from,
+        Command::Velocity { linear, .. } => *linear,
+        Command::Press { axis, .. } => *axis,
+        Command::Stop { .. } => return None,
+    }
+    .try_normalize(0.0)
 }

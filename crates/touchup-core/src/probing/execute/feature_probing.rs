@@ -3,10 +3,10 @@
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 
 use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
-use super::prober::{Flag, ProbeParams, Prober};
+use super::prober::{Flag, Prober};
 use super::route::ToolState;
 use super::world::{Phase, Progress, World};
-use crate::probing::arm::{OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget};
+use crate::probing::arm::{OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED};
 use crate::probing::plan::{ExploreError, Explorer, TouchPlan, TouchResult};
 
 /// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
@@ -74,7 +74,7 @@ impl<'a> Prober<'a> {
 
     /// The explorer and where the arm is, when both can begin.
     pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
-        let state = self.in_free_air()?;
+        let state = self.in_free_air(self.params.limits.tare)?;
         let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
         let probing = FeatureProbing {
             flag: flag.id,
@@ -171,16 +171,15 @@ impl FeatureProbing<'_, '_> {
 
     /// A link move, or one that is guarded, to a pose of the tip in B.
     fn line(&mut self, doing: &'static str, to: &Isometry3<f64>, guard: LineGuard) -> Result<(), Ending> {
-        let ProbeParams { touch, limits, .. } = self.prober.params;
-        let (speed, trigger) = match guard {
-            LineGuard::Link => (touch.link_speed, LINK_TRIGGER * touch.trigger),
-            LineGuard::Slow => (touch.safe_speed(), touch.trigger),
-            // the part may be in contact
-            LineGuard::Out | LineGuard::Retract => (touch.link_speed, limits.force),
-        };
+        let touch = &self.prober.params.touch;
         let mut watched = self.prober.watched();
         watched.heeds = if guard == LineGuard::Retract { StopRequest::Stay } else { StopRequest::Retract };
-        let moved = watched.line(doing, to, speed, touch, trigger);
+        let moved = match guard {
+            LineGuard::Link => watched.line(doing, to, touch.link_speed, touch, UNEXPECTED * touch.trigger),
+            LineGuard::Slow => watched.line(doing, to, touch.safe_speed(), touch, touch.trigger),
+            // the part may be in contact
+            LineGuard::Out | LineGuard::Retract => watched.leave(doing, to, touch.link_speed, touch),
+        };
         let seen = watched.seen();
         self.keep(seen);
         // however slow a link is, nothing should be there
@@ -330,7 +329,5 @@ enum LineGuard {
     Retract,
 }
 
-/// In a fast move the sensor also measures accelerations: more force than this many triggers is an obstacle.
-const LINK_TRIGGER: f64 = 1.5;
 /// The mesh is searched this far from a contact, m.
 const DEVIATION_REACH: f64 = 20e-3;

@@ -61,7 +61,7 @@ impl Prober<'_> {
     /// # Errors
     /// [`PayloadProbeError`]; the arm is stopped then.
     pub fn measure_payload(&mut self) -> Result<PayloadReadings, PayloadProbeError> {
-        let state = self.in_free_air()?;
+        let state = self.in_free_air(self.params.limits.force)?;
         let home = ToolState::of(self.cell, &state);
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
@@ -111,7 +111,8 @@ impl Prober<'_> {
             }
             r_bt = state.pose_bt.rotation;
         })?;
-        watched.zero()?;
+        let most = watched.limits.force;
+        watched.zero_below(most)?;
         Ok(block.map(|block| (StaticPose { r_wt: r_bt * r_tf, ..block.static_pose() }, block.end_ns)))
     }
 }

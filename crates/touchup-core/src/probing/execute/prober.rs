@@ -103,7 +103,9 @@ impl<'a> Prober<'a> {
     }
 
     /// Where the arm is, at rest in free air with its sensor zeroed.
-    pub(super) fn in_free_air(&mut self) -> Result<ArmState, Ending> {
+    ///
+    /// - `most_n`: that the sensor may feel before, N.
+    pub(super) fn in_free_air(&mut self, most_n: f64) -> Result<ArmState, Ending> {
         // zeroing the sensor would remove a force that acts now
         let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
         let now = self.arm.next_state().map_err(arm)?;
@@ -115,7 +117,7 @@ impl<'a> Prober<'a> {
             return Err(LinkError::InPart { place_mm }.into());
         }
         // in free air, where it is stopped: the first link is watched by the force as well
-        self.watched().zero()?;
+        self.watched().zero_below(most_n)?;
         Ok(self.arm.next_state().map_err(arm)?)
     }
 }
