@@ -10,13 +10,14 @@ mod peer;
 
 use std::path::Path;
 use std::process::{Child, Command};
-use std::sync::mpsc::sync_channel;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
 use touchup::ros::arguments::NodeConfig;
+use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
     HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
 };
@@ -85,8 +86,8 @@ fn parameters(folder: &Path, faces: usize) -> Parameters {
 
 fn alone(faces: usize) {
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
-    let (inbox, received) = sync_channel(INBOX);
-    let (port, world) = in_process::start(inbox, &touchup::clock::Clock::system());
+    let (inbox, received) = inbox(INBOX, &Clock::system());
+    let (port, world) = in_process::start(inbox, &Clock::system());
     let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
     let node = ready.start(port, received, None).expect("there are threads");
     let mut published = 0;
@@ -124,15 +125,15 @@ fn config(domain: u16, parameters: Parameters) -> NodeConfig {
 
 /// Answers wrenches over DDS, and does nothing else.
 fn echo(domain: u16) {
-    let (inbox, arrivals) = sync_channel(INBOX);
+    let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     let port = dds::start(&config(domain, Parameters::default()), inbox.clone()).expect("the loopback interface is up");
     let mut asking = other("echo", domain, ECHO_SECONDS);
     let waiting = std::thread::spawn(move || {
         let is_well = asking.wait().is_ok_and(|status| status.success());
-        inbox.send(Arrival::Shutdown).expect("the echo listens");
+        inbox.put(Arrival::Shutdown);
         assert!(is_well, "the other process failed");
     });
-    for arrival in arrivals {
+    while let Some(arrival) = arrivals.recv() {
         match arrival {
             Arrival::Wrench(WrenchStamped { header, .. }, _) => {
                 port.publish(Publication::Mismatch(HapticMismatch { header, ..HapticMismatch::default() }));
@@ -158,7 +159,7 @@ fn over_dds(faces: usize, seconds: usize) {
     echo(domain);
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
     let parameters = parameters(folder.path(), faces);
-    let (inbox, received) = sync_channel(INBOX);
+    let (inbox, received) = inbox(INBOX, &Clock::system());
     let ready = Prepared::new(parameters.clone()).expect("the scan is sound");
     let port = dds::start(&config(domain, parameters), inbox.clone()).expect("the loopback interface is up");
     let node = ready.start(port.clone(), received, None).expect("there are threads");
@@ -179,7 +180,7 @@ fn over_dds(faces: usize, seconds: usize) {
     let joined = other("late", domain, 0).wait();
     assert!(joined.is_ok_and(|status| status.success()), "the late joiner failed");
     println!("lost in transport {:?}, unsent {:?}", port.lost(), port.unsent());
-    inbox.send(Arrival::Shutdown).expect("the node listens");
+    inbox.put(Arrival::Shutdown);
     print_summary(&node.join().expect("the result can be written").report);
     drop(port);
     echo(domain);

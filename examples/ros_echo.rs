@@ -4,14 +4,15 @@
 //! cargo run --release --example ros_echo -- [TILES] [--ros-args ...]; ends when its standard input does
 
 use std::io::{Write, stdin, stdout};
-use std::sync::mpsc::sync_channel;
 use std::thread;
 
+use touchup::clock::Clock;
 use touchup::ros::arguments::{NodeConfig, split};
 use touchup::ros::dds;
+use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
     ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point, ProbeFeatureResponse,
-    ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, SetBoolResponse, UndoResponse, Vector3,
+    ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, UndoResponse, Vector3,
 };
 use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -54,16 +55,16 @@ fn main() -> anyhow::Result<()> {
     let (own, ros) = split(std::env::args().skip(1));
     let tiles: i32 = own.first().map_or(Ok(0), |count| count.parse())?;
     let config = NodeConfig::new(&ros, |name| std::env::var(name).ok())?;
-    let (inbox, arrivals) = sync_channel(4096);
+    let (inbox, arrivals) = inbox(4096, &Clock::system());
     let port = dds::start(&config, inbox.clone())?;
     (0..tiles).for_each(|id| port.publish(Publication::Tile(tile(id))));
     thread::spawn(move || {
         // ends as well when the other end is dropped
         let _ = std::io::copy(&mut stdin(), &mut std::io::sink());
-        let _ = inbox.send(Arrival::Shutdown);
+        inbox.put(Arrival::Shutdown);
     });
     println!("ready");
-    for arrival in arrivals {
+    while let Some(arrival) = arrivals.recv() {
         match arrival {
             Arrival::Wrench(wrench, _) => port.publish(Publication::Mismatch(HapticMismatch {
                 actual_force: wrench.wrench.force,
@@ -75,9 +76,6 @@ fn main() -> anyhow::Result<()> {
                 let message = "echo".repeat(request.strokes as usize);
                 let answer = UndoResponse { success: true, message, mesh_version: 1 << 40, ..Default::default() };
                 reply.send(UndoResponse { strokes: request.strokes, ..answer });
-            }
-            Arrival::Call(Call::Pause(request, reply)) => {
-                reply.send(SetBoolResponse { success: request.data, message: "echo".into() });
             }
             Arrival::Call(Call::Detect(_, reply)) => {
                 let features = (0..FEATURES).map(|id| Feature { id, ..outline() }).collect();

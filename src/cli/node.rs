@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::Builder;
 
 use clap::Args;
@@ -10,10 +9,12 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require};
+use crate::clock::Clock;
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
+use crate::ros::inbox::{Inbox, inbox};
 use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::Arrival;
@@ -40,7 +41,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let (scan, faces) = ready.scan();
     print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
     print_result(&ready.cost(config.parameters.string("robot") != "none").to_string());
-    let (inbox, arrivals) = sync_channel(INBOX);
+    let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let port = ros::start(&config, inbox)?;
     let arm = arm_of(&config, ready.scene())?;
@@ -87,8 +88,9 @@ impl NodeArguments {
     }
 }
 
-/// The first signal ends the node, which saves; the second one does not wait for that.
-fn end_on_signals(inbox: SyncSender<Arrival>) -> std::io::Result<()> {
+/// The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still retracts stop and
+/// stay; one more, or the second where no arm moves, waits for nothing.
+fn end_on_signals(inbox: Inbox) -> std::io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
     let mut signals = {
         let _entered = runtime.enter();
@@ -99,11 +101,16 @@ fn end_on_signals(inbox: SyncSender<Arrival>) -> std::io::Result<()> {
     };
     let listen = move || {
         runtime.block_on(any(&mut signals));
-        notify("ends and saves; a second signal ends it at once");
+        notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
         // a node that has ended already needs none
-        let _ = inbox.send(Arrival::Shutdown);
-        runtime.block_on(any(&mut signals));
-        std::process::exit(1);
+        inbox.put(Arrival::Shutdown);
+        loop {
+            runtime.block_on(any(&mut signals));
+            if !inbox.stops().interrupt() {
+                std::process::exit(1);
+            }
+            notify("the arm stops and stays where it is; one more signal ends the node at once");
+        }
     };
     Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
 }

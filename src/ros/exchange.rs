@@ -3,14 +3,14 @@
 use std::fmt::Display;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::TrySendError;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{Builder, JoinHandle};
 
 use super::arguments::NodeConfig;
 use super::clock::RosClock;
+use super::inbox::Inbox;
 use super::names::NameError;
-use super::port::{Arrival, Call, Endpoint, Inbox, Port, Publication, Reply};
+use super::port::{Arrival, Call, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
 
 /// Why the node cannot speak to others.
@@ -34,63 +34,9 @@ pub enum RosError {
     Thread(#[from] io::Error),
 }
 
-/// Where arrivals go, and how many could not.
-#[derive(Debug)]
-pub(super) struct Arrivals {
-    pub inbox: Inbox,
-    /// wrenches and poses, others
-    dropped: [AtomicU64; 2],
-    is_over: AtomicBool,
-}
-
-impl Arrivals {
-    pub fn new(inbox: Inbox) -> Self {
-        Self { inbox, dropped: [const { AtomicU64::new(0) }; 2], is_over: AtomicBool::new(false) }
-    }
-
-    /// Puts it into the inbox of the node, or counts it; never waits. Whether it got in.
-    pub fn put(&self, arrival: Arrival) -> bool {
-        let put = self.inbox.try_send(arrival);
-        match &put {
-            Ok(()) => {}
-            Err(TrySendError::Full(lost)) => {
-                let which = usize::from(!matches!(lost, Arrival::Wrench(..) | Arrival::Pose(..)));
-                self.dropped[which].fetch_add(1, Ordering::Relaxed);
-            }
-            Err(TrySendError::Disconnected(_)) => self.end(),
-        }
-        put.is_ok()
-    }
-
-    /// Reports who else is on a topic: to the log, and to the node for its diagnostics.
-    ///
-    /// - `mismatch`: why one of them does not fit.
-    pub fn report(&self, topic: String, count: usize, mismatch: Option<String>) {
-        match &mismatch {
-            Some(reason) => tracing::warn!(topic, "{reason}"),
-            None => tracing::info!(topic, others = count, "who is on a topic has changed"),
-        }
-        self.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
-    }
-
-    /// As [`super::port::Port::dropped`].
-    pub fn dropped(&self) -> [u64; 2] {
-        self.dropped.each_ref().map(|count| count.load(Ordering::Relaxed))
-    }
-
-    /// Nobody takes anything any more.
-    pub fn end(&self) {
-        self.is_over.store(true, Ordering::Relaxed);
-    }
-
-    pub fn is_over(&self) -> bool {
-        self.is_over.load(Ordering::Relaxed)
-    }
-}
-
 /// What the parts of a port share.
 pub(super) struct Exchange {
-    pub arrivals: Arrivals,
+    pub inbox: Inbox,
     pub clock: RosClock,
     /// what is small and urgent, answers among it
     pub urgent: SendQueue,
@@ -102,7 +48,7 @@ pub(super) struct Exchange {
 impl Exchange {
     pub fn new(config: &NodeConfig, inbox: Inbox) -> Arc<Self> {
         Arc::new(Self {
-            arrivals: Arrivals::new(inbox),
+            inbox,
             clock: RosClock::new(config.parameters.bool("use_sim_time")),
             urgent: SendQueue::default(),
             mesh: SendQueue::default(),
@@ -112,7 +58,7 @@ impl Exchange {
 
     /// A service or the action was called.
     pub fn call(&self, call: Call) {
-        self.arrivals.put(Arrival::Call(call));
+        self.inbox.put(Arrival::Call(call));
     }
 
     /// An answer that goes out from the thread that sends.
@@ -194,7 +140,7 @@ impl<C: Send + Sync> Port for Joined<C> {
     }
 
     fn dropped(&self) -> [u64; 2] {
-        self.exchange.arrivals.dropped()
+        self.exchange.inbox.dropped()
     }
 
     fn lost(&self) -> [u64; 2] {
@@ -209,28 +155,5 @@ impl<C: Send + Sync> Port for Joined<C> {
 
     fn tiles_waiting(&self) -> usize {
         self.exchange.mesh.tiles_waiting()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::mpsc::sync_channel;
-    use std::time::Instant;
-
-    use super::*;
-    use crate::ros::messages::{PoseStamped, TFMessage};
-
-    #[test]
-    fn what_finds_no_room_is_counted_by_what_it_is() {
-        let (inbox, node) = sync_channel(1);
-        let arrivals = Arrivals::new(inbox);
-        for _ in 0..3 {
-            arrivals.put(Arrival::Pose(PoseStamped::default(), Instant::now()));
-        }
-        arrivals.put(Arrival::Tf(TFMessage::default()));
-        assert_eq!((arrivals.dropped(), arrivals.is_over()), ([2, 1], false));
-        drop(node);
-        arrivals.put(Arrival::Shutdown);
-        assert_eq!((arrivals.dropped(), arrivals.is_over()), ([2, 1], true), "nobody is there to drop it for");
     }
 }

@@ -6,10 +6,11 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use super::exchange::Arrivals;
+use super::inbox::Inbox;
 use super::locked;
 use super::messages::{PoseStamped, WrenchStamped};
-use super::port::{Arrival, Call, Inbox, Port, Publication, Reply, SamplePort};
+use super::port::{Arrival, Call, Port, Publication, Reply, SamplePort};
+use super::stop::StopState;
 use crate::clock::Clock;
 
 /// Publications that are kept for reading; the oldest go first.
@@ -21,7 +22,7 @@ struct InProcess {
     clock: Clock,
     /// the time of ROS, ns, and when it was that
     now_ns: Mutex<(i64, Instant)>,
-    arrivals: Arrivals,
+    inbox: Inbox,
     unsent: AtomicU64,
 }
 
@@ -41,7 +42,7 @@ impl Port for InProcess {
     }
 
     fn dropped(&self) -> [u64; 2] {
-        self.arrivals.dropped()
+        self.inbox.dropped()
     }
 
     fn lost(&self) -> [u64; 2] {
@@ -70,7 +71,7 @@ pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) 
         published: Mutex::default(),
         now_ns: Mutex::new((0, clock.now())),
         clock: clock.clone(),
-        arrivals: Arrivals::new(inbox),
+        inbox,
         unsent: AtomicU64::new(0),
     });
     (port.clone(), OtherParticipants { port })
@@ -79,12 +80,17 @@ pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) 
 impl OtherParticipants {
     /// Something arrives; where the node is too slow it is dropped and counted, as on a network. Whether it got in.
     pub fn arrive(&self, arrival: Arrival) -> bool {
-        self.port.arrivals.put(arrival)
+        self.port.inbox.put(arrival)
     }
 
     /// Something arrives, as soon as the node has room for it. Whether the node is still there.
     pub fn arrive_patiently(&self, arrival: Arrival) -> bool {
-        self.port.arrivals.inbox.send(arrival).is_ok()
+        self.port.inbox.put_patiently(arrival)
+    }
+
+    /// What stops the arm of the node, as the services `~/pause` and `~/stop` do it.
+    pub fn stops(&self) -> &StopState {
+        self.port.inbox.stops()
     }
 
     /// Calls a service: `world.call(|reply| Call::Undo(request, reply)).recv()` is the answer.
@@ -131,11 +137,12 @@ impl SamplePort for OtherParticipants {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ros::inbox::inbox;
     use crate::ros::messages::{Clock as ClockMessage, UndoRequest, UndoResponse, WrenchStamped};
 
     #[test]
     fn a_call_is_answered_by_who_reads_the_inbox() {
-        let (inbox, arrivals) = sync_channel(8);
+        let (inbox, arrivals) = inbox(8, &Clock::system());
         let (_port, world) = start(inbox, &Clock::system());
         let answers = world.call(|reply| Call::Undo(UndoRequest { strokes: 2 }, reply));
         match arrivals.recv().unwrap() {
@@ -149,7 +156,7 @@ mod tests {
 
     #[test]
     fn what_finds_no_room_is_counted_by_kind() {
-        let (inbox, _arrivals) = sync_channel(1);
+        let (inbox, _arrivals) = inbox(1, &Clock::system());
         let (port, world) = start(inbox, &Clock::system());
         let now = Instant::now();
         assert!(world.arrive(Arrival::Wrench(WrenchStamped::default(), now)));
@@ -162,7 +169,7 @@ mod tests {
     #[test]
     fn the_time_of_ros_passes_as_that_of_the_clock() {
         let (clock, hand) = Clock::manual();
-        let (port, world) = start(sync_channel(1).0, &clock);
+        let (port, world) = start(inbox(1, &clock).0, &clock);
         assert_eq!(port.now_ns(), 0);
         hand.advance(std::time::Duration::from_millis(5));
         assert_eq!(port.now_ns(), 5_000_000);
@@ -173,7 +180,7 @@ mod tests {
 
     #[test]
     fn publications_come_back_in_their_order() {
-        let (inbox, _arrivals) = sync_channel(1);
+        let (inbox, _arrivals) = inbox(1, &Clock::system());
         let (port, world) = start(inbox, &Clock::system());
         for strokes in 0..3 {
             port.publish(Publication::Mismatch(crate::ros::messages::HapticMismatch {

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod dds;
 mod exchange;
 pub mod in_process;
+pub mod inbox;
 pub mod messages;
 pub mod names;
 pub mod node;
@@ -16,8 +17,10 @@ pub mod parameters;
 pub mod port;
 #[cfg(feature = "r2r")]
 pub mod r2r;
+mod refusal;
 mod send_queue;
 mod services;
+pub mod stop;
 mod topics;
 
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]

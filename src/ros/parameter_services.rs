@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use super::exchange::{Exchange, RosError};
 use super::locked;
 use super::messages::{self, *};
-use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, descriptor};
+use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, Settable, descriptor};
 use super::port::{Arrival, Reply};
 use super::services::{Serves, services};
 
@@ -87,7 +87,7 @@ impl PublicParameters {
             results.push(result(set));
             self.set(wanted, results, answer);
         });
-        exchange.arrivals.put(Arrival::SetParameter(name, value, reply));
+        exchange.inbox.put(Arrival::SetParameter(name, value, reply));
     }
 
     /// All or none, as far as the table of parameters can say before any is set.
@@ -150,7 +150,7 @@ fn describe(name: &str) -> messages::ParameterDescriptor {
     let Ok(declared) = descriptor(name) else { return described };
     described.r#type = type_of(&declared.default_value());
     described.description = declared.description.to_owned();
-    described.read_only = !declared.live;
+    described.read_only = declared.settable == Settable::AtStart;
     match declared.allowed {
         Allowed::Double(_, from_value, to_value) => {
             described.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];

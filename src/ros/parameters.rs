@@ -83,6 +83,17 @@ pub enum Allowed {
     OneOf(&'static str, &'static [&'static str]),
 }
 
+/// When a parameter can be set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Settable {
+    /// when the node starts
+    AtStart,
+    /// also while it runs
+    Live,
+    /// while it runs only to `false`, and then it stays so
+    OnlyToFalse,
+}
+
 /// What is declared of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterDescriptor {
@@ -90,8 +101,8 @@ pub struct ParameterDescriptor {
     pub name: &'static str,
     /// its default and its range
     pub allowed: Allowed,
-    /// whether it can be set while the node runs
-    pub live: bool,
+    /// when it can be set
+    pub settable: Settable,
     /// what it does
     pub description: &'static str,
 }
@@ -103,10 +114,10 @@ pub const KIND_NAMES: [&str; 8] = ["unknown", "hole", "slot", "pocket", "boss", 
 pub const PARAMETERS: &[ParameterDescriptor] = {
     use Allowed::{Bool, Double, OneOf, String};
     const fn fixed(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
-        ParameterDescriptor { name, allowed, live: false, description }
+        ParameterDescriptor { name, allowed, settable: Settable::AtStart, description }
     }
     const fn live(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
-        ParameterDescriptor { name, allowed, live: true, description }
+        ParameterDescriptor { name, allowed, settable: Settable::Live, description }
     }
     &[
         fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
@@ -125,7 +136,12 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
         fixed("robot", OneOf("none", &["none", "sim", "ur"]), "the arm"),
         fixed("sim_part", String(""), "the part as it is, which a simulated arm touches"),
-        live("allow_motion", Bool(false), "whether it may move"),
+        ParameterDescriptor {
+            name: "allow_motion",
+            allowed: Bool(false),
+            settable: Settable::OnlyToFalse,
+            description: "whether it may move",
+        },
         fixed(
             "service_mapping",
             OneOf("enhanced", &["enhanced", "cyclone"]),
@@ -188,6 +204,14 @@ pub enum ParameterError {
         /// as given
         value: ParameterValue,
     },
+    /// once it is false it stays so
+    #[error(
+        "{name} cannot be set to true while the node runs: start it again with -p {name}:=true, and with robot.{name}: true in the scene"
+    )]
+    OnlyToFalse {
+        /// which one
+        name: &'static str,
+    },
 }
 
 fn did_you_mean(near: &Option<&'static str>) -> String {
@@ -201,6 +225,21 @@ impl ParameterDescriptor {
             Allowed::Bool(on) => ParameterValue::Bool(on),
             Allowed::Double(number, ..) => ParameterValue::Double(number),
             Allowed::String(word) | Allowed::OneOf(word, _) => ParameterValue::String(word.to_owned()),
+        }
+    }
+
+    /// The value as it is to be kept from now on, while the node runs. To set what is set already is no change, and allowed.
+    ///
+    /// # Errors
+    /// As [`Self::check`]; [`ParameterError::NotLive`], [`ParameterError::OnlyToFalse`].
+    pub fn change(&self, now: &ParameterValue, to: &ParameterValue) -> Result<ParameterValue, ParameterError> {
+        let (name, to) = (self.name, self.check(to)?);
+        match self.settable {
+            _ if to == *now => Ok(to),
+            Settable::Live => Ok(to),
+            Settable::AtStart => Err(ParameterError::NotLive { name, value: to }),
+            Settable::OnlyToFalse if to == ParameterValue::Bool(false) => Ok(to),
+            Settable::OnlyToFalse => Err(ParameterError::OnlyToFalse { name }),
         }
     }
 
@@ -266,17 +305,14 @@ impl Parameters {
         Ok(())
     }
 
-    /// Sets one while the node runs. To set what is set already is no change, and allowed.
+    /// Sets one while the node runs, as [`ParameterDescriptor::change`] allows.
     ///
     /// # Errors
     /// [`ParameterError`]; nothing is changed then.
     pub fn set_live(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
         let declared = descriptor(name)?;
-        let value = declared.check(value)?;
-        if !declared.live && self.0.get(declared.name) != Some(&value) {
-            return Err(ParameterError::NotLive { name: declared.name, value });
-        }
-        self.0.insert(declared.name, value);
+        let now = self.0.entry(declared.name).or_insert_with(|| declared.default_value());
+        *now = declared.change(now, value)?;
         Ok(())
     }
 
@@ -350,6 +386,18 @@ mod tests {
             assert!(error.starts_with(reason), "{error}");
         }
         assert_eq!(parameters, Parameters::default());
+    }
+
+    #[test]
+    fn motion_that_was_taken_away_is_allowed_again_only_by_a_start() {
+        let mut parameters = Parameters::default();
+        let [yes, no] = [true, false].map(ParameterValue::Bool);
+        parameters.set("allow_motion", &yes).unwrap();
+        parameters.set_live("allow_motion", &yes).unwrap();
+        parameters.set_live("allow_motion", &no).unwrap();
+        let why = parameters.set_live("allow_motion", &yes).unwrap_err().to_string();
+        assert!(why.contains("start it again with -p allow_motion:=true") && why.contains("scene"), "{why}");
+        assert!(!parameters.bool("allow_motion"));
     }
 
     #[test]

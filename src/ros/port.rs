@@ -4,7 +4,6 @@
 //! file: messages are the plain structs of [`super::messages`], a request carries the closure that answers it.
 
 use std::fmt;
-use std::sync::mpsc::SyncSender;
 use std::time::Instant;
 
 use super::messages::*;
@@ -61,8 +60,6 @@ pub enum Call {
     Redo(UndoRequest, Reply<UndoResponse>),
     /// `~/reset`
     Reset(Reply<TriggerResponse>),
-    /// `~/pause`
-    Pause(SetBoolRequest, Reply<SetBoolResponse>),
     /// `~/arm_state`
     ArmState(Reply<TriggerResponse>),
     /// what an arm works at
@@ -172,8 +169,8 @@ pub struct Endpoint {
     pub mismatch: Option<String>,
 }
 
-/// The way out. What comes in goes to the [`SyncSender`] that a port is started with; where that is full, the port counts
-/// what it drops ([`Port::dropped`]).
+/// The way out. What comes in goes to the [`Inbox`](super::inbox::Inbox) that a port is started with, which counts what it drops
+/// ([`Port::dropped`]).
 pub trait Port: Send + Sync {
     /// Sends; never blocks for longer than it takes to write the message down.
     fn publish(&self, publication: Publication);
@@ -205,6 +202,3 @@ pub trait SamplePort: Send {
     /// How many listen now: to wrenches, to poses.
     fn listeners(&mut self) -> [usize; 2];
 }
-
-/// Where arrivals go.
-pub type Inbox = SyncSender<Arrival>;

@@ -38,7 +38,7 @@ macro_rules! services {
 pub(super) use services;
 
 services! {
-    /// Offers those whose requests go to the inbox of the node.
+    /// Offers those whose requests go to the inbox of the node, and those that stop its arm at once.
     fn serve(Exchange);
     "~/flag_feature": FlagFeature, |to, request, reply| to.call(Call::Flag(request, reply));
     "~/unflag_feature": UnflagFeature, |to, request, reply| to.call(Call::Unflag(request, reply));
@@ -48,7 +48,8 @@ services! {
     "~/undo": Undo, |to, request, reply| to.call(Call::Undo(request, reply));
     "~/redo": Undo, |to, request, reply| to.call(Call::Redo(request, reply));
     "~/reset": Trigger, |to, _, reply| to.call(Call::Reset(reply));
-    "~/pause": SetBool, |to, request, reply| to.call(Call::Pause(request, reply));
+    "~/pause": SetBool, |to, request, reply| reply.send(to.inbox.stops().pause(request.data));
+    "~/stop": Trigger, |to, _, reply| reply.send(to.inbox.stops().stop());
     "~/probe_all": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::All(reply)));
     "~/recover": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::Recover(reply)));
     "~/arm_state": Trigger, |to, _, reply| to.call(Call::ArmState(reply));
@@ -61,6 +62,44 @@ pub(super) const PROBE: &str = "~/probe";
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
+    use std::sync::mpsc::channel;
+
+    use super::*;
+    use crate::clock::Clock;
+    use crate::ros::arguments::NodeConfig;
+    use crate::ros::inbox::inbox;
+    use crate::ros::port::Arrival;
+
+    /// Calls what stops as soon as it is offered.
+    struct CallsStops(Vec<String>);
+
+    impl<S: RosService<Request: Default, Response: std::fmt::Debug>> Serves<S> for CallsStops {
+        fn serve(
+            &mut self,
+            name: &'static str,
+            mut call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
+        ) -> Result<(), RosError> {
+            if ["~/pause", "~/stop"].contains(&name) {
+                let (to, answer) = channel();
+                call(S::Request::default(), Reply::new(move |said| drop(to.send(said))));
+                self.0.push(format!("{name}: {:?}", answer.try_recv().unwrap()));
+            }
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_stop_is_answered_on_the_thread_that_hears_it_though_no_sample_finds_room() {
+        let config = NodeConfig::new(&[], |_| None).unwrap();
+        let (inbox, _arrivals) = inbox(1, &Clock::system());
+        while inbox.put(Arrival::Viewer) {}
+        let exchange = Exchange::new(&config, inbox.clone());
+        let mut calls = CallsStops(Vec::new());
+        serve(&mut calls, &exchange).unwrap();
+        let CallsStops(answers) = calls;
+        assert!(answers.len() == 2 && answers[0].contains("samples are taken"), "{answers:?}");
+        assert!(answers[1].contains("no arm configured") && inbox.stops().request().is_some(), "{answers:?}");
+    }
 
     /// What stands between `before` and `after`, each time.
     fn between<'a>(text: &'a str, before: &'a str, after: char) -> BTreeSet<&'a str> {

@@ -14,9 +14,9 @@ from ros_cyclone import (
     Pose,
     PoseStamped,
     Quaternion,
-    SetBoolRequest,
-    SetBoolResponse,
     Time,
+    TriggerRequest,
+    TriggerResponse,
     Vector3,
     Wrench,
     WrenchStamped,
@@ -46,8 +46,8 @@ def in_step(node, recording, domain):
     kinds = {"/stylus/pose": (PoseStamped, pose), "/stylus/wrench": (WrenchStamped, wrench)}
     writers = {topic: peer.writer(topic, kind, BEST_EFFORT) for topic, (kind, _) in kinds.items()}
     # the node hears of writers in the order in which they are made: when it answers, it knows those of the samples
-    pause = Client(node, domain, "pause", SetBoolRequest, SetBoolResponse, peer)
-    pause.introduce(False)
+    state = Client(node, domain, "arm_state", TriggerRequest, TriggerResponse, peer)
+    state.introduce(0)
     messages = []
     with recording.open("rb") as file:
         for _, channel, _, read in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(list(kinds)):
@@ -60,9 +60,9 @@ def in_step(node, recording, domain):
     for begin in range(0, len(messages), WINDOW):
         for _, topic, message in messages[begin : begin + WINDOW]:
             writers[topic].write(message)
-        pause.ask(False)
+        state.ask(0)
         yield
-    pause.ask(False)
+    state.ask(0)
 
 
 def play_in_step(node, recording, domain):

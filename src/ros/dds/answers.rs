@@ -178,7 +178,7 @@ mod tests {
         ListParametersResult, Point, ProbeResult, SetParametersResult,
     };
     use crate::ros::parameter_services::{describe_all, get, list, result as set_result};
-    use crate::ros::parameters::{PARAMETERS, ParameterDescriptor, ParameterValue, Parameters};
+    use crate::ros::parameters::{PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, Settable};
 
     /// The smallest packet that a network of today has: what IPv6 asks for, and tunnels have.
     const TUNNEL: usize = 1280;
@@ -325,7 +325,7 @@ mod tests {
         let mut described_briefly = described(names());
         described_briefly.reduce(room(ETHERNET));
         let types = GetParameterTypesResponse { types: vec![0; PARAMETERS.len()] };
-        let live = PARAMETERS.iter().filter(|declared| declared.live);
+        let live = PARAMETERS.iter().filter(|declared| declared.settable != Settable::AtStart);
         let refused =
             |one: &ParameterDescriptor| Parameters::default().set_live(one.name, &ParameterValue::Integer(-1));
         let results = live.map(|one| set_result(refused(one).map_err(|why| why.to_string()))).collect();

@@ -111,7 +111,7 @@ impl DdsGraph {
                     self.report(local, None);
                 }
                 if is_new && self.tiles == Some(local) {
-                    self.exchange.arrivals.put(Arrival::Viewer);
+                    self.exchange.inbox.put(Arrival::Viewer);
                 }
                 if let Some((service, what)) = self.callers.get(&remote) {
                     tracing::info!(service, "{what}");
@@ -167,7 +167,7 @@ impl DdsGraph {
                 let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
                 let of_topic = self.matched.values().filter(|(own, _)| own == name);
                 let count = of_topic.map(|(_, others)| others.len()).sum();
-                self.exchange.arrivals.report(name.clone(), count, Some(reason));
+                self.exchange.inbox.report(name.clone(), count, Some(reason));
             }
             return;
         }
@@ -183,13 +183,13 @@ impl DdsGraph {
             let reason = format!(
                 "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
             );
-            self.exchange.arrivals.report(service.to_owned(), 1, Some(reason));
+            self.exchange.inbox.report(service.to_owned(), 1, Some(reason));
         }
     }
 
     fn report(&self, local: GUID, mismatch: Option<String>) {
         if let Some((name, others)) = self.matched.get(&local) {
-            self.exchange.arrivals.report(name.clone(), others.len(), mismatch);
+            self.exchange.inbox.report(name.clone(), others.len(), mismatch);
         }
     }
 }

@@ -45,13 +45,13 @@ pub(super) fn listen(
         // what came before the registration wakes nobody
         listeners.iter_mut().for_each(|listener| listener.take());
         let mut looked = Instant::now();
-        while !exchange.arrivals.is_over() {
+        while !exchange.inbox.is_over() {
             if let Err(error) = poll.poll(&mut events, look_every) {
                 if error.kind() == io::ErrorKind::Interrupted {
                     continue;
                 }
                 tracing::error!(%error, "the node hears nothing any more");
-                exchange.arrivals.put(Arrival::Shutdown);
+                exchange.inbox.put(Arrival::Shutdown);
                 return;
             }
             for event in &events {
@@ -78,7 +78,7 @@ pub(super) fn drain<T>(
         match receive() {
             Ok(Some(message)) => take(message),
             Ok(None) => return,
-            Err(error) => drop(exchange.arrivals.put(Arrival::Unreadable(name, format!("{error}{remark}")))),
+            Err(error) => drop(exchange.inbox.put(Arrival::Unreadable(name, format!("{error}{remark}")))),
         }
     }
 }
@@ -130,7 +130,7 @@ impl<M: RosMessage> Listener for HeardTopic<M> {
                     let lost = numbers.missing(info.publisher_gid(), info.sequence_number());
                     exchange.lost[counter].fetch_add(lost, Ordering::Relaxed);
                 }
-                exchange.arrivals.put(arrival(exchange, message));
+                exchange.inbox.put(arrival(exchange, message));
             },
         );
     }

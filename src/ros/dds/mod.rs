@@ -24,9 +24,10 @@ use self::back_end::{DdsBackEnd, join};
 use self::graph::{DdsGraph, mapping};
 use super::arguments::NodeConfig;
 use super::exchange::{self, Exchange, Joined, RosError};
+use super::inbox::Inbox;
 use super::parameter_services::{self, PublicParameters};
 use super::parameters::{PARAMETERS, ParameterValue, Parameters};
-use super::port::{Inbox, Port};
+use super::port::Port;
 use super::topics::{mesh, subscribe, urgent};
 pub use samples::samples;
 
@@ -40,7 +41,7 @@ struct DdsConnection {
 
 impl Drop for DdsConnection {
     fn drop(&mut self) {
-        self.exchange.arrivals.end();
+        self.exchange.inbox.end();
         self.exchange.close();
         // without it the thread stays until the next message: nothing worse
         let _ = self.waker.wake();

@@ -1,13 +1,12 @@
 //! What the node does when it is asked.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::mpsc::TrySendError;
 use std::time::Duration;
 
 use nalgebra::Point3;
 use tracing::warn;
 
-use super::arm::refuse;
 use super::channels::{FeatureInput, ViewInput};
 use super::convert::{header, point_of, stamp_ns, trigger};
 use super::error::NodeError;
@@ -19,11 +18,12 @@ use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
-    FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse, SaveMeshRequest,
-    SaveMeshResponse, SetBoolResponse, UndoRequest, UndoResponse,
+    DetectFeaturesResponse, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse,
+    SaveMeshRequest, SaveMeshResponse, UndoRequest, UndoResponse, UnflagFeatureResponse,
 };
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Call, Endpoint, Reply};
+use crate::ros::stop::NO_ARM;
 use crate::session::StrokeChange;
 
 /// A flag may reach so far, m.
@@ -54,17 +54,11 @@ impl RefinementWorker {
                 let begun = self.begin_again().map(|name| format!("begun again: session {name}"));
                 reply.send(trigger(begun.map_err(|error| error.to_string())));
             }
-            Call::Pause(request, reply) => {
-                self.is_paused = request.data;
-                self.arm.iter().for_each(|arm| arm.common.is_paused.store(request.data, Ordering::Release));
-                let message = if request.data { "paused: samples are passed over" } else { "samples are taken" };
-                reply.send(SetBoolResponse { success: true, message: message.to_owned() });
-            }
             Call::Arm(order) => {
                 let header = header(self.port.now_ns(), &self.setup.shared.frame);
                 match &self.arm {
                     Some(arm) => arm.order(order, self.session.folder.path(), header),
-                    None => refuse(order, header, ProbeResult::NO_ARM, NO_ARM),
+                    None => order.refuse(header, ProbeResult::NO_ARM, NO_ARM),
                 }
             }
             Call::ArmState(reply) => reply.send(match &self.arm {
@@ -75,8 +69,15 @@ impl RefinementWorker {
     }
 
     fn ask_features(&self, input: FeatureInput) {
-        if self.features.try_send(input).is_err() {
-            warn!("a call about features found no room: its caller gets no answer");
+        let Err(TrySendError::Full(input) | TrySendError::Disconnected(input)) = self.features.try_send(input) else {
+            return;
+        };
+        let message = "the thread of the features is behind: nothing was done; call again".to_owned();
+        match input {
+            FeatureInput::Flag(_, Some(reply)) => reply.send(FlagFeatureResponse { message, ..Default::default() }),
+            FeatureInput::Unflag(_, reply) => reply.send(UnflagFeatureResponse { message, ..Default::default() }),
+            FeatureInput::Detect(_, reply) => reply.send(DetectFeaturesResponse { message, ..Default::default() }),
+            _ => warn!("{message}"),
         }
     }
 
@@ -247,8 +248,6 @@ impl RefinementWorker {
         let mut parameters = (*self.setup.shared.parameters()).clone();
         parameters.set_live(name, value).map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
-        let may_move = parameters.bool("allow_motion");
-        self.arm.iter().for_each(|arm| arm.common.may_move.store(may_move, Ordering::Release));
         self.setup.shared.set_parameters(parameters);
         self.setup.shared.offer(&self.view, ViewInput::Parameters);
         Ok(())
@@ -261,8 +260,6 @@ impl RefinementWorker {
         self.endpoints.insert(endpoint.topic.clone(), endpoint);
     }
 }
-
-const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
 
 /// The files of one call of `~/save_mesh`.
 fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultFiles, String> {

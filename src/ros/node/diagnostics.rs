@@ -41,7 +41,7 @@ impl RefinementWorker {
             let words = format!("does not record, make room on the disk and it goes on: {reason}");
             return (DiagnosticStatus::ERROR, words);
         }
-        if self.is_paused {
+        if self.stops.is_paused() {
             return (DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
         }
         if let Some((_, why)) =

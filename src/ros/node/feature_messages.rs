@@ -9,6 +9,7 @@ use crate::ros::messages::{
     ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Vector3 as Vector3Msg,
 };
 use crate::ros::parameters::KIND_NAMES;
+use crate::ros::refusal::unknown_feature;
 
 /// Half of the interval that holds 95 % of a normal distribution, in standard deviations.
 const AT_95_PERCENT: f64 = 1.96;
@@ -91,32 +92,11 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
 
 /// A place that somebody pointed at, where nothing was found yet.
 pub fn flagged(flag: &Flag) -> FeatureMsg {
-    let nan = f64::NAN;
     FeatureMsg {
-        id: flag.id,
         kind: number_of(flag.kind),
-        status: FeatureMsg::STATUS_FLAGGED,
-        fitted_to: FeatureMsg::FITTED_TO_NOTHING,
         search_radius: flag.radius,
         center: point(&flag.place),
-        center_std: nan,
-        axis: NO_VECTOR,
-        axis_std: nan,
-        direction: NO_VECTOR,
-        diameter: nan,
-        diameter_std: nan,
-        length: nan,
-        length_std: nan,
-        width: nan,
-        width_std: nan,
-        depth: nan,
-        depth_std: nan,
-        cone_angle: nan,
-        cone_angle_std: nan,
-        through: FeatureMsg::UNKNOWN,
-        convex: FeatureMsg::UNKNOWN,
-        group: FeatureMsg::NO_GROUP,
-        ..FeatureMsg::default()
+        ..unknown_feature(flag.id)
     }
 }
 

@@ -22,8 +22,10 @@ use super::side_work::SideWork;
 use super::streams::StreamWatch;
 use crate::haptic::RefineError;
 use crate::live::LiveError;
+use crate::ros::inbox::Arrivals;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
+use crate::ros::stop::StopState;
 use crate::stylus::{Message, Sample, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
@@ -68,7 +70,8 @@ pub struct RefinementWorker {
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     pub(super) streams: [StreamWatch; 2],
-    pub(super) is_paused: bool,
+    /// what stops the arm, and the samples
+    pub(super) stops: Arc<StopState>,
     pub(super) fault: Option<String>,
     /// when a message was refused because its frames are not connected, and why
     pub(super) lost_transform: Option<(Instant, String)>,
@@ -86,7 +89,7 @@ pub struct RefinementWorker {
 }
 
 impl RefinementWorker {
-    /// Ready to take samples.
+    /// Ready to take samples; without an arm.
     pub fn new(
         setup: Arc<Setup>,
         port: Arc<dyn Port>,
@@ -94,7 +97,7 @@ impl RefinementWorker {
         view: SyncSender<ViewInput>,
         features: SyncSender<FeatureInput>,
         spare: Receiver<Box<Edits>>,
-        arm: Option<ArmHandle>,
+        stops: Arc<StopState>,
     ) -> Self {
         let now = setup.clock.now();
         let (object, tool, sensor) =
@@ -108,13 +111,13 @@ impl RefinementWorker {
             view,
             features,
             spare,
-            arm,
+            arm: None,
             unsent: None,
             kept: None,
             session,
             waiting: Default::default(),
             streams: [StreamWatch::new(now), StreamWatch::new(now)],
-            is_paused: false,
+            stops,
             fault: None,
             lost_transform: None,
             last_state: String::new(),
@@ -127,13 +130,18 @@ impl RefinementWorker {
         }
     }
 
+    /// The same with an arm that probes what it is asked for.
+    pub fn with_arm(self, arm: Option<ArmHandle>) -> Self {
+        Self { arm, ..self }
+    }
+
     /// Runs until it is asked to end, or nobody can ask any more; ends the session.
     ///
     /// # Errors
     /// [`NodeError`] when the result could not be written.
-    pub fn run(mut self, inbox: &Receiver<Arrival>) -> Result<NodeEnd, NodeError> {
+    pub fn run(mut self, inbox: Arrivals) -> Result<NodeEnd, NodeError> {
         loop {
-            let flow = match self.setup.clock.recv_timeout(inbox, IDLE) {
+            let flow = match inbox.recv_timeout(&self.setup.clock, IDLE) {
                 Ok(arrival) => self.take(arrival),
                 Err(RecvTimeoutError::Timeout) => ControlFlow::Continue(()),
                 Err(RecvTimeoutError::Disconnected) => ControlFlow::Break(()),
@@ -143,6 +151,9 @@ impl RefinementWorker {
             }
             self.tick();
         }
+        // it stops, retracts and ends while the session is written; who calls now is refused
+        self.arm = None;
+        drop(inbox);
         self.end()
     }
 
@@ -163,11 +174,7 @@ impl RefinementWorker {
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
             Arrival::Viewer => self.setup.shared.has_new_viewer.store(true, Ordering::Relaxed),
-            Arrival::Shutdown => {
-                // it stops, retracts and ends while the session is written
-                self.arm = None;
-                return ControlFlow::Break(());
-            }
+            Arrival::Shutdown => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
     }
@@ -184,7 +191,7 @@ impl RefinementWorker {
     fn message(&mut self, message: ArrivedMessage, at: Instant) {
         let stream = message.stream();
         self.streams[stream].arrive(self.setup.clock.now());
-        if self.is_paused || self.fault.is_some() {
+        if self.stops.is_paused() || self.fault.is_some() {
             self.session.counters.paused += 1;
             return;
         }

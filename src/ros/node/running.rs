@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 
 use super::arm::{self, ArmOfNode};
@@ -15,8 +15,10 @@ use super::setup::Setup;
 use super::side_work::begin;
 use super::view::View;
 use crate::clock::Clock;
-use crate::ros::parameters::Parameters;
-use crate::ros::port::{Arrival, Port};
+use crate::ros::inbox::Arrivals;
+use crate::ros::parameters::{ParameterValue, Parameters};
+use crate::ros::port::Port;
+use crate::ros::stop::ALLOW_MOTION;
 use crate::scene::{Memory, Scene, SceneCost};
 
 /// Inputs that wait for the view at most: frames of it are dropped first.
@@ -25,7 +27,7 @@ const VIEW_QUEUE: usize = 256;
 const FEATURE_QUEUE: usize = 256;
 /// Changes of the mesh that go round.
 const EDITS_ROUND: usize = 2;
-/// Arrivals that wait for the node at most: two seconds of both streams.
+/// Samples that wait for the node at most: two seconds of both streams.
 pub const INBOX: usize = 4096;
 
 /// A node that runs.
@@ -93,17 +95,12 @@ impl Prepared {
     /// Starts the threads.
     ///
     /// - `arm`: that probes what is flagged; without one orders are answered so.
-    /// - `inbox`: where the port puts what arrives; the node ends with [`Arrival::Shutdown`], or when nothing can arrive any
+    /// - `arrivals`: what the port puts in; the node ends with [`Shutdown`](crate::ros::port::Arrival::Shutdown), or when nothing can arrive any
     ///   more.
     ///
     /// # Errors
     /// [`NodeError`]
-    pub fn start(
-        self,
-        port: Arc<dyn Port>,
-        inbox: Receiver<Arrival>,
-        arm: Option<ArmOfNode>,
-    ) -> Result<Node, NodeError> {
+    pub fn start(self, port: Arc<dyn Port>, arrivals: Arrivals, arm: Option<ArmOfNode>) -> Result<Node, NodeError> {
         let Self { setup, session } = self;
         let (folder, name) = (session.folder.path().to_owned(), session.folder.name().to_owned());
         let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
@@ -113,14 +110,17 @@ impl Prepared {
             to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
         }
         let clock = setup.clock.clone();
+        let stops = Arc::clone(arrivals.stops());
+        // false is what every start allows
+        let _ = stops.allow(&ParameterValue::Bool(setup.shared.parameters().bool(ALLOW_MOTION)));
         let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare);
         let features = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), name);
-        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_features.clone())).transpose()?;
+        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_features.clone(), &stops)).transpose()?;
         let (handle, arm) = arm.unzip();
-        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, handle);
+        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, stops).with_arm(handle);
         let view = begin(&clock, "view", move || view.run(&view_inputs))?;
         let features = begin(&clock, "features", move || features.run(&feature_inputs))?;
-        let haptic = begin(&clock, "haptic", move || haptic.run(&inbox))?;
+        let haptic = begin(&clock, "haptic", move || haptic.run(arrivals))?;
         Ok(Node { haptic, others: arm.into_iter().chain([features, view]).collect(), folder })
     }
 }

@@ -75,9 +75,9 @@ impl R2rGraph {
             match look(node) {
                 Ok(seen) if seen != *reported => {
                     if *is_mesh && seen.0 > reported.0 {
-                        exchange.arrivals.put(Arrival::Viewer);
+                        exchange.inbox.put(Arrival::Viewer);
                     }
-                    exchange.arrivals.report(topic.clone(), seen.0, seen.1.clone());
+                    exchange.inbox.report(topic.clone(), seen.0, seen.1.clone());
                     *reported = seen;
                 }
                 Ok(_) => {}

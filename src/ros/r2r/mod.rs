@@ -26,11 +26,12 @@ use stand_in::{std_srvs, touchup_msgs};
 use super::arguments::NodeConfig;
 use super::clock::time;
 use super::exchange::{self, Exchange, Joined, RosError};
+use super::inbox::Inbox;
 use super::locked;
 use super::messages::{Parameter, ParameterEvent};
 use super::parameter_services::{self, PublicParameters, raw};
 use super::parameters::ParameterValue;
-use super::port::{Arrival, Inbox, Port};
+use super::port::{Arrival, Port};
 use super::topics::{mesh, subscribe, urgent};
 use back_end::{During, PollSource, R2rBackEnd};
 use convert::Convert;
@@ -48,7 +49,7 @@ impl Drop for R2rConnection {
     fn drop(&mut self) {
         self.exchange.close();
         exchange::join(self.sending.drain(..));
-        self.exchange.arrivals.end();
+        self.exchange.inbox.end();
         exchange::join(self.spinning.take());
     }
 }
@@ -125,7 +126,7 @@ const PAUSE: Duration = Duration::from_millis(2);
 fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: R2rGraph, exchange: &Exchange) {
     let _reports_end = ReportsEnd(exchange);
     let mut in_vain = 0;
-    while !exchange.arrivals.is_over() {
+    while !exchange.inbox.is_over() {
         let began = Instant::now();
         node.spin_once(NOTHING_CAME);
         let has_come = sources.iter_mut().fold(false, |any, take| take() | any);
@@ -145,9 +146,9 @@ struct ReportsEnd<'a>(&'a Exchange);
 
 impl Drop for ReportsEnd<'_> {
     fn drop(&mut self) {
-        if !self.0.arrivals.is_over() {
+        if !self.0.inbox.is_over() {
             tracing::error!("the node hears nothing any more: ROS has ended");
-            self.0.arrivals.put(Arrival::Shutdown);
+            self.0.inbox.put(Arrival::Shutdown);
         }
     }
 }

@@ -46,7 +46,7 @@ where
         self.graph.watch_senders(self.config.resolve(topic.name)?, M::TYPE_NAME, profile);
         let exchange = self.exchange.clone();
         self.sources.push(source(messages, move |message| {
-            exchange.arrivals.put(arrival(&exchange, M::ours(message)));
+            exchange.inbox.put(arrival(&exchange, M::ours(message)));
         }));
         Ok(())
     }

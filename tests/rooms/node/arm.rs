@@ -1,135 +1,16 @@
 //! The node with an arm, without any network: flagged, probed, shown, cancelled, refused.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 
-use nalgebra::Isometry3;
-use tempfile::TempDir;
-use touchup::clock::{Clock, ManualClock};
-use touchup::io::mesh_file::{MeshUnit, write_mesh};
+use touchup::clock::Clock;
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command, Safety};
-use touchup::ros::in_process::{OtherParticipants, start};
-use touchup::ros::messages::{
-    Feature, FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeGoal, ProbeResponse,
-    ProbeResult, ProbeSettings, ProbeTouch, SetBoolRequest,
-};
-use touchup::ros::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
-use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::{ArmOrder, Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply};
-use touchup::sim::{ArmParams, Plate, SimArm};
+use touchup::ros::messages::{Feature, ProbeFeatureRequest, ProbeResult, ProbeSettings, ProbeTouch};
+use touchup::ros::node::ArmKind;
+use touchup::ros::parameters::ParameterValue;
+use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
 
-use super::samples::bench::join;
-use crate::plate_stream::plate_scan;
-
-/// Nothing takes so long: what has not come by then hangs.
-const HUNG: Duration = Duration::from_secs(120);
-/// Arrivals that wait for the node at most: an arm in lock step is not ahead of it by more.
-const FEW: usize = 8;
-
-/// A node with an arm whose states pass the time: as fast as the node keeps up, and no faster.
-struct Cell {
-    node: Node,
-    world: OtherParticipants,
-    hand: ManualClock,
-    published: Vec<Publication>,
-    _folder: TempDir,
-}
-
-impl Cell {
-    /// The plate of the demo, its scan, a simulated arm.
-    fn start(may_move: bool) -> Self {
-        Self::with(may_move, |_| ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap())))
-    }
-
-    fn with(may_move: bool, kind: impl FnOnce(&Clock) -> ArmKind) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let path = |name: &str| folder.path().join(name);
-        write_mesh(&path("scan.ply"), &plate_scan(1), MeshUnit::Millimetre).unwrap();
-        std::fs::write(path("scene.yaml"), include_str!("../../../config/probe.yaml")).unwrap();
-        let mut parameters = Parameters::default();
-        let text = |value: &std::path::Path| ParameterValue::String(value.to_str().unwrap().to_owned());
-        parameters.set("scene", &text(&path("scene.yaml"))).unwrap();
-        parameters.set("session_folder", &text(&path("sessions"))).unwrap();
-        parameters.set("source", &ParameterValue::String("probe".to_owned())).unwrap();
-        parameters.set("allow_motion", &ParameterValue::Bool(may_move)).unwrap();
-        let (inbox, arrivals) = sync_channel(FEW);
-        let (clock, hand) = Clock::lock_step();
-        let (port, world) = start(inbox, &clock);
-        world.set_now_ns(1_000_000_000_000);
-        let arm = ArmOfNode { kind: kind(&clock), samples: Box::new(world.clone()) };
-        let node = Prepared::on(clock, parameters).unwrap().start(port, arrivals, Some(arm)).unwrap();
-        let cell = Self { node, world, hand, published: Vec::new(), _folder: folder };
-        let begun = Instant::now();
-        while !cell.state().0 {
-            assert!(begun.elapsed() < HUNG, "{}", cell.state().1);
-            std::thread::yield_now();
-        }
-        cell
-    }
-
-    fn state(&self) -> (bool, String) {
-        let answer = self.world.call(Call::ArmState).recv().unwrap();
-        (answer.success, answer.message)
-    }
-
-    /// Of the tip over the object's origin, mm.
-    fn height(&self) -> f64 {
-        let state = self.state().1;
-        let numbers: Vec<f64> = state.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect();
-        *numbers.last().unwrap()
-    }
-
-    fn flag(&self, kind: u8, [x, y, z]: [f64; 3]) -> u32 {
-        let header = Header { frame_id: "object".to_owned(), ..Header::default() };
-        let request = FlagFeatureRequest {
-            kind,
-            point: PointStamped { header, point: Point { x: x / 1e3, y: y / 1e3, z: z / 1e3 } },
-            search_radius: 3e-3,
-        };
-        let answer = self.world.call(|reply| Call::Flag(request, reply)).recv().unwrap();
-        assert!(answer.success, "{}", answer.message);
-        answer.id
-    }
-
-    fn probe(&self, id: u32, settings: ProbeSettings) -> ProbeResult {
-        let request = ProbeFeatureRequest { id, settings };
-        self.world.call(|reply| Call::Arm(ArmOrder::Feature(request, reply))).recv().unwrap().result
-    }
-
-    /// Sends a goal, and does something at its third touch, while the arm waits for that; how it ended.
-    ///
-    /// - `at_third`: gets what cancels the goal
-    fn goal(&self, ids: &[u32], at_third: impl FnOnce(&AtomicBool) + Send + 'static) -> (GoalEnd, ProbeResponse) {
-        let (to, result) = sync_channel(1);
-        let (cancel, at_third) = (Arc::new(AtomicBool::new(false)), Mutex::new(Some(at_third)));
-        let cancelled = Arc::clone(&cancel);
-        let feedback = move |feedback: touchup::ros::messages::ProbeFeedback| {
-            if feedback.touch >= 3
-                && let Some(at_third) = at_third.lock().unwrap().take()
-            {
-                at_third(&cancel);
-            }
-        };
-        let goal = Goal {
-            accept: Reply::new(|accepted: bool| assert!(accepted)),
-            feedback: Feedback(Box::new(feedback)),
-            result: Reply::new(move |ended| drop(to.send(ended))),
-            is_cancelled: cancelled,
-        };
-        let asked = ProbeGoal { ids: ids.to_vec(), settings: ProbeSettings::default() };
-        assert!(self.world.arrive_patiently(Arrival::Call(Call::Arm(ArmOrder::Goal(asked, goal)))));
-        result.recv_timeout(HUNG).unwrap()
-    }
-
-    fn end(mut self) -> (NodeEnd, Vec<Publication>) {
-        self.world.arrive_patiently(Arrival::Shutdown);
-        let end = join(self.node, &self.hand);
-        self.published.extend(self.world.published());
-        (end, self.published)
-    }
-}
+use super::cell::{Cell, HUNG, SimulatedArm};
 
 /// Of a plane one raster: planned, made, and published.
 #[test]
@@ -256,35 +137,31 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
     cell.end();
 }
 
-/// A pause, and motion that is no longer allowed, end what moves; it goes on only when asked anew.
+/// A pause, and motion that is no longer allowed, keep it from moving; only a pause ends while the node runs.
 #[test]
-fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
+fn a_paused_arm_moves_again_and_one_that_may_not_move_needs_a_start() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
-    let pause = |world: &OtherParticipants, data| {
-        world.call(|reply| Call::Pause(SetBoolRequest { data }, reply)).recv().unwrap();
-    };
-    let allow = |world: &OtherParticipants, may: bool| {
+    let code = || cell.probe(id, ProbeSettings { max_touches: 3, ..ProbeSettings::default() }).code;
+    let allow = |may| {
         let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(may), reply);
-        world.ask(set).recv().unwrap().unwrap();
+        cell.world.ask(set).recv().unwrap()
     };
-    for (is_pause, why, code) in [
-        (true, "the node is paused", ProbeResult::PAUSED),
-        (false, "allow_motion is off", ProbeResult::MOTION_NOT_ALLOWED),
-    ] {
-        let world = cell.world.clone();
-        let stop = move |_: &AtomicBool| if is_pause { pause(&world, true) } else { allow(&world, false) };
-        let (end, response) = cell.goal(&[id], stop);
-        // no client cancelled it
-        assert_eq!((end, response.code), (GoalEnd::Aborted, ProbeResult::CANCELLED), "{}", response.message);
-        assert!(response.message.contains(why), "{}", response.message);
-        assert!(cell.height() > 14.0, "it retracted: {}", cell.state().1);
-        assert_eq!(cell.probe(id, ProbeSettings::default()).code, code);
-        let all = cell.world.call(|reply| Call::Arm(ArmOrder::All(reply))).recv().unwrap();
-        assert!(!all.success, "{}", all.message);
-        pause(&cell.world, false);
-        allow(&cell.world, true);
-    }
+    assert!(cell.world.stops().pause(true).success);
+    assert_eq!(code(), ProbeResult::PAUSED);
+    let all = cell.world.call(|reply| Call::Arm(ArmOrder::All(reply))).recv().unwrap();
+    assert!(!all.success, "{}", all.message);
+    assert!(cell.world.stops().pause(false).success);
+    assert_eq!(code(), ProbeResult::TOUCHES_SPENT);
+    allow(false).unwrap();
+    let why = allow(true).unwrap_err();
+    assert!(why.contains("start it again") && why.contains("scene"), "{why}");
+    assert_eq!(code(), ProbeResult::MOTION_NOT_ALLOWED);
+    cell.end();
+    // one that was started so
+    let cell = Cell::start(false);
+    let set = |reply| Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(true), reply);
+    assert!(cell.world.ask(set).recv().unwrap().unwrap_err().contains("start it again"));
     cell.end();
 }
 
@@ -292,7 +169,7 @@ fn a_pause_and_the_leave_that_is_taken_away_stop_and_retract() {
 #[test]
 fn a_stop_stands_until_it_is_recovered() {
     let (says, said) = sync_channel(1);
-    let cell = Cell::with(true, |clock| ArmKind::Real(Box::new(Stopping::new(said, clock.clone()))));
+    let cell = Cell::with(true, |clock| ArmKind::Real(Box::new(Stopping::new(said, clock))));
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
     // returns when the node has seen a state of it
     let say = |safety| {
@@ -320,45 +197,18 @@ fn a_stop_stands_until_it_is_recovered() {
     cell.end();
 }
 
-/// What is asked of the thread of an arm, and where the answer goes.
-enum Asked {
-    State(SyncSender<Result<ArmState, ArmError>>),
-    Command(Command, SyncSender<Result<(), ArmError>>),
-    Zero(SyncSender<Result<(), ArmError>>),
-}
-
-/// A simulated arm on a thread of its own, whose safety system says what the test sets.
+/// A simulated arm whose safety system says what the test sets.
 struct Stopping {
-    asks: SyncSender<Asked>,
+    arm: SimulatedArm,
     said: Receiver<(Safety, SyncSender<()>)>,
     safety: Safety,
     /// a message when the node has taken the last state
     seen: Option<SyncSender<()>>,
-    clock: Clock,
 }
 
 impl Stopping {
-    fn new(said: Receiver<(Safety, SyncSender<()>)>, clock: Clock) -> Self {
-        let (asks, asked) = sync_channel::<Asked>(1);
-        std::thread::spawn(move || {
-            let (plate, params) = (Plate::default(), ArmParams::default());
-            let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-            let mut arm = SimArm::new(&plate, params, &start).unwrap();
-            for asked in asked {
-                match asked {
-                    Asked::State(to) => drop(to.send(arm.next_state())),
-                    Asked::Command(command, to) => drop(to.send(arm.command(&command))),
-                    Asked::Zero(to) => drop(to.send(arm.zero_sensor())),
-                }
-            }
-        });
-        Self { asks, said, safety: Safety::Normal, seen: None, clock }
-    }
-
-    fn ask<T>(&self, what: impl FnOnce(SyncSender<T>) -> Asked) -> T {
-        let (to, answer) = sync_channel(1);
-        self.asks.send(what(to)).unwrap();
-        answer.recv().unwrap()
+    fn new(said: Receiver<(Safety, SyncSender<()>)>, clock: &Clock) -> Self {
+        Self { arm: SimulatedArm::new(clock), said, safety: Safety::Normal, seen: None }
     }
 }
 
@@ -371,24 +221,23 @@ impl Arm for Stopping {
         if let Ok((safety, seen)) = self.said.try_recv() {
             (self.safety, self.seen) = (safety, Some(seen));
         }
-        self.clock.sleep(Duration::from_millis(2));
-        let state = self.ask(Asked::State)?;
+        let state = self.arm.next_state()?;
         Ok(ArmState { safety: if self.safety == Safety::Normal { state.safety } else { self.safety }, ..state })
     }
 
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {
-        self.ask(|to| Asked::Command(*command, to))
+        self.arm.command(command)
     }
 
     fn zero_sensor(&mut self) -> Result<(), ArmError> {
-        self.ask(Asked::Zero)
+        self.arm.zero_sensor()
     }
 
     fn recover(&mut self) -> Result<(), ArmError> {
-        Ok(())
+        self.arm.recover()
     }
 
     fn period(&self) -> f64 {
-        2e-3
+        self.arm.period()
     }
 }

@@ -1,3 +1,5 @@
 mod arm;
+mod cell;
 mod files;
 mod samples;
+mod stops;

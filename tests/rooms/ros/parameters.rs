@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use touchup::ros::parameters::{Allowed, PARAMETERS, ParameterDescriptor, ParameterValue};
+use touchup::ros::parameters::{Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Settable};
 
 /// In every node, so in neither of the two files.
 const EVERYWHERE: &str = "use_sim_time";
@@ -22,7 +22,11 @@ fn row(declared: &ParameterDescriptor) -> [String; 6] {
         Allowed::Bool(_) | Allowed::String(_) => String::new(),
     };
     let default = declared.default_value();
-    let live = if declared.live { "yes" } else { "no" };
+    let live = match declared.settable {
+        Settable::AtStart => "no",
+        Settable::Live => "yes",
+        Settable::OnlyToFalse => "to false",
+    };
     let type_name = default.type_name().to_owned();
     [declared.name.into(), type_name, default.to_string(), range, live.into(), declared.description.into()]
 }

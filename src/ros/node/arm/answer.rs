@@ -1,36 +1,23 @@
 //! What came of a probing, as messages.
 
-use nalgebra::Point3;
-
 use crate::probing::arm::{
-    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, TouchMoment, TouchOutcome, TouchRecord,
+    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, StopRequest, TouchMoment, TouchOutcome,
+    TouchRecord,
 };
 use crate::probing::execute::{Cell, Ending, Flag, Plan, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::clock::time;
 use crate::ros::messages::{Feature, Header, Point, ProbeResponse, ProbeResult, ProbeTouch, Time};
 use crate::ros::node::convert::{NO_VECTOR, point, pose, vector};
 use crate::ros::node::feature_messages::{flagged, found};
+use crate::ros::refusal::not_probed;
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
 const NOWHERE: Point = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
 
-/// Not begun, and nothing is known of it.
-pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
-    let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
-    refused(&Flag { id, kind: None, place: nowhere, radius: f64::NAN }, code, why.to_owned())
-}
-
 /// Not begun.
 pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
-    ProbeResult {
-        id: target.id,
-        code,
-        message,
-        feature: flagged(target),
-        uncertainty: f64::NAN,
-        ..ProbeResult::default()
-    }
+    ProbeResult { feature: flagged(target), ..not_probed(target.id, code, &message) }
 }
 
 /// A dry run.
@@ -159,10 +146,17 @@ fn code_of(ending: &Ending) -> u8 {
         Ending::TouchesSpent => ProbeResult::TOUCHES_SPENT,
         Ending::TimeSpent => ProbeResult::TIME_SPENT,
         Ending::NothingFound(_) => ProbeResult::NOTHING_FOUND,
-        Ending::Cancelled(_) => ProbeResult::CANCELLED,
+        Ending::Cancelled(request) => cancelled(*request),
         Ending::OutOfLimits(_) => ProbeResult::OUT_OF_LIMITS,
         Ending::NoClearPath(_) => ProbeResult::NO_CLEAR_PATH,
         Ending::Stopped(error) => stopped(error),
+    }
+}
+
+fn cancelled(request: StopRequest) -> u8 {
+    match request {
+        StopRequest::Retract => ProbeResult::CANCELLED,
+        StopRequest::Stay => ProbeResult::STOPPED_IN_PLACE,
     }
 }
 
@@ -185,7 +179,7 @@ fn stopped(error: &ProbeError) -> u8 {
         ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
         ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => ProbeResult::UNEXPECTED_CONTACT,
         ProbeError::TooLong { .. } | ProbeError::Pulls { .. } => ProbeResult::FAULT,
-        ProbeError::Cancelled { .. } => ProbeResult::CANCELLED,
+        ProbeError::Cancelled { request, .. } => cancelled(*request),
     }
 }
 
@@ -256,6 +250,8 @@ fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
+
     use crate::probing::execute::{HeldBack, PlannedMotion};
 
     fn touch(rows: usize) -> ProbeTouch {

@@ -1,23 +1,20 @@
 //! What the thread of the arm and the others know of each other.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use crate::probing::arm::{ArmError, ArmState, Safety};
 use crate::probing::execute::Cell;
 use crate::ros::locked;
-use crate::ros::messages::{ProbeResult, TriggerResponse};
+use crate::ros::messages::TriggerResponse;
+use crate::ros::stop::StopState;
 
 /// Read and written by any thread.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Common {
     is_busy: AtomicBool,
-    /// the node ends: the arm stops, retracts, and takes nothing up any more
-    pub is_ending: AtomicBool,
-    /// `~/pause`: what moves stops and retracts
-    pub is_paused: AtomicBool,
-    /// the parameter `allow_motion`: where it is taken away, what moves stops and retracts
-    pub may_move: AtomicBool,
+    /// what stops it
+    pub stops: Arc<StopState>,
     seen: Mutex<StateSeen>,
 }
 
@@ -30,6 +27,11 @@ struct StateSeen {
 }
 
 impl Common {
+    /// Nothing is known yet.
+    pub fn new(stops: Arc<StopState>) -> Self {
+        Self { is_busy: AtomicBool::new(false), stops, seen: Mutex::default() }
+    }
+
     /// Takes up an order; whether no other is worked at.
     pub fn begin(&self) -> bool {
         !self.is_busy.swap(true, Ordering::AcqRel)
@@ -38,20 +40,6 @@ impl Common {
     /// The order is done.
     pub fn done(&self) {
         self.is_busy.store(false, Ordering::Release);
-    }
-
-    /// Why the arm may not move now: a code of [`ProbeResult`], and in words.
-    pub fn why_not(&self) -> Option<(u8, &'static str)> {
-        let reasons = [
-            (self.is_ending.load(Ordering::Acquire), ProbeResult::SHUTDOWN, "the node ends"),
-            (self.is_paused.load(Ordering::Acquire), ProbeResult::PAUSED, "the node is paused"),
-            (
-                !self.may_move.load(Ordering::Acquire),
-                ProbeResult::MOTION_NOT_ALLOWED,
-                "the parameter allow_motion is off",
-            ),
-        ];
-        reasons.into_iter().find(|(is_so, ..)| *is_so).map(|(_, code, why)| (code, why))
     }
 
     /// A state came. A stop in it is one until somebody has looked, also when nobody moved the arm.
@@ -78,11 +66,6 @@ impl Common {
         seen.fault.replace(error.to_string()).is_none()
     }
 
-    /// None will come.
-    pub fn fail(&self, why: &str) {
-        locked(&self.seen).fault = Some(why.to_owned());
-    }
-
     /// The arm was stopped while it moved.
     pub fn stop(&self, why: &str) {
         locked(&self.seen).stop = Some(why.to_owned());
@@ -99,6 +82,7 @@ impl Common {
     /// # Errors
     /// In words.
     pub fn ready(&self) -> Result<(), String> {
+        self.stops.ready()?;
         let seen = locked(&self.seen);
         match (&seen.fault, &seen.stop, seen.last.map(|state| state.safety)) {
             (Some(error), ..) => Err(error.clone()),

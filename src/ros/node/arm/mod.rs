@@ -7,4 +7,4 @@ mod request;
 mod worker;
 mod world;
 
-pub use worker::{ArmHandle, ArmKind, ArmOfNode, refuse, start};
+pub use worker::{ArmHandle, ArmKind, ArmOfNode, start};

@@ -9,18 +9,18 @@ use std::time::Duration;
 
 use tracing::{info, warn};
 
-use super::answer::{not_probed, planned as planned_result, refused, response_of, result_of, summary_of, touches_of};
+use super::answer::{planned as planned_result, refused, response_of, result_of, summary_of, touches_of};
 use super::common::Common;
 use super::pace::Paced;
 use super::request::Wanted;
 use super::world::{ArmLink, ArmWorld, GoalWatcher, ask_mesh, is_cancelled};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
-use crate::probing::arm::Arm;
+use crate::probing::arm::{Arm, StopRequest};
 use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, plan};
 use crate::ros::messages::{
-    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResponse, ProbeResult,
-    ProbeSettings, TriggerResponse,
+    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResult, ProbeSettings,
+    TriggerResponse,
 };
 use crate::ros::node::channels::{ArmMeasurement, FeatureInput};
 use crate::ros::node::convert::{header, point, trigger};
@@ -28,6 +28,8 @@ use crate::ros::node::error::NodeError;
 use crate::ros::node::setup::Setup;
 use crate::ros::node::side_work::begin;
 use crate::ros::port::{ArmOrder, Goal, GoalEnd, Port, Publication, SamplePort};
+use crate::ros::refusal::not_probed;
+use crate::ros::stop::{Motion, StopState};
 use crate::scene::simulated_arm;
 use crate::sim::{MeshSurface, SimArm};
 
@@ -41,25 +43,6 @@ const WAIT: Duration = Duration::from_secs(15);
 const FOLLOW: i64 = 1024;
 /// Farther off it is another clock, ns.
 const OTHER_CLOCK_NS: i64 = 200_000_000;
-
-/// Answers that nothing was done, and why.
-///
-/// - `code`: of [`ProbeResult`]
-pub fn refuse(order: ArmOrder, header: Header, code: u8, why: &str) {
-    match order {
-        ArmOrder::Feature(request, reply) => {
-            let result = ProbeResult { header, ..not_probed(request.id, code, why) };
-            reply.send(ProbeFeatureResponse { result });
-        }
-        ArmOrder::Goal(goal, Goal { accept, result, .. }) => {
-            accept.send(true);
-            let first = goal.ids.first().copied();
-            let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
-            result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
-        }
-        ArmOrder::All(reply) | ArmOrder::Recover(reply) => reply.send(trigger(Err(why.to_owned()))),
-    }
-}
 
 /// An order, and the folder of the session, where what is touched is written down.
 type FolderOrder = (ArmOrder, PathBuf);
@@ -91,7 +74,7 @@ pub struct ArmHandle {
 
 impl Drop for ArmHandle {
     fn drop(&mut self) {
-        self.common.is_ending.store(true, Ordering::Release);
+        self.common.stops.end();
     }
 }
 
@@ -100,18 +83,17 @@ impl ArmHandle {
     ///
     /// - `folder`: of the session, where what is touched is written down.
     pub fn order(&self, order: ArmOrder, folder: &Path, header: Header) {
+        if let Err(why) = self.common.stops.heard() {
+            return order.refuse(header, ProbeResult::ARM_NOT_READY, &why);
+        }
         if !self.common.begin() {
-            return refuse(order, header, ProbeResult::BUSY, BUSY);
+            return order.refuse(header, ProbeResult::BUSY, BUSY);
         }
         let Err(error) = self.inputs.try_send((order, folder.to_owned())) else { return };
         self.common.done();
         match error {
-            TrySendError::Full((order, _)) => refuse(order, header, ProbeResult::BUSY, BUSY),
-            // its thread has ended, and has said why
-            TrySendError::Disconnected((order, _)) => {
-                let why = self.common.ready().err().unwrap_or_else(|| "the thread of the arm has ended".to_owned());
-                refuse(order, header, ProbeResult::ARM_NOT_READY, &why);
-            }
+            TrySendError::Full((order, _)) => order.refuse(header, ProbeResult::BUSY, BUSY),
+            TrySendError::Disconnected((order, _)) => order.refuse(header, ProbeResult::ARM_NOT_READY, HAS_ENDED),
         }
     }
 
@@ -142,29 +124,44 @@ pub fn start(
     port: &Arc<dyn Port>,
     arm: ArmOfNode,
     features: SyncSender<FeatureInput>,
+    stops: &Arc<StopState>,
 ) -> Result<(ArmHandle, JoinHandle<()>), NodeError> {
     let (cell, params) = setup.scene.probing().ok_or(NodeError::NoRobot)?;
     let (to, inputs) = sync_channel(QUEUE);
-    let common = Arc::new(Common::default());
-    common.may_move.store(setup.shared.parameters().bool("allow_motion"), Ordering::Release);
+    let common = Arc::new(Common::new(Arc::clone(stops)));
+    stops.look();
+    let ends = EndsArm(Arc::clone(stops));
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
     let link = ArmLink { setup: Arc::clone(setup), samples, common, offset_ns: None, begun: setup.clock.now() };
     let mut worker = ArmWorker { link, port: Arc::clone(port), features, cell, params, inputs, ros_ns: i64::MIN };
     let run = move || {
+        let EndsArm(stops) = &ends;
         match kind {
             ArmKind::Real(mut arm) => worker.run(&mut *arm),
             ArmKind::Sim(part) => {
                 if let Err(why) = worker.run_simulated(&part) {
                     warn!("{why}");
-                    worker.link.common.fail(&why);
+                    stops.end_arm(&why);
                 }
             }
+        }
+        if stops.is_ending() {
+            stops.end_arm("as the node ends");
         }
         worker.refuse_the_rest();
     };
     let thread = begin(&setup.clock, "arm", run)?;
     Ok((handle, thread))
+}
+
+/// Says that the thread of the arm has ended, however it did.
+struct EndsArm(Arc<StopState>);
+
+impl Drop for EndsArm {
+    fn drop(&mut self) {
+        self.0.end_arm("by a fault of touchup: please report it with the session's folder");
+    }
 }
 
 impl ArmWorker {
@@ -179,7 +176,7 @@ impl ArmWorker {
 
     /// Streams, and does what it is asked, until the node ends.
     fn run(&mut self, arm: &mut dyn Arm) {
-        while !self.link.common.is_ending.load(Ordering::Acquire) {
+        while !self.link.common.stops.is_ending() {
             self.see_next(arm);
             match self.inputs.try_recv() {
                 Ok((order, folder)) => self.take(order, &folder, arm),
@@ -192,12 +189,16 @@ impl ArmWorker {
     /// Nobody who still waits is left without an answer.
     fn refuse_the_rest(&self) {
         for (order, _) in self.inputs.try_iter() {
-            refuse(order, self.header(), ProbeResult::SHUTDOWN, "the node ends");
+            let why = self.link.common.ready().err().unwrap_or_else(|| HAS_ENDED.to_owned());
+            let is_ending = self.link.common.stops.is_ending();
+            let code = if is_ending { ProbeResult::SHUTDOWN } else { ProbeResult::ARM_NOT_READY };
+            order.refuse(self.header(), code, &why);
         }
     }
 
     /// Takes the next state of an arm that nobody moves.
     fn see_next(&mut self, arm: &mut dyn Arm) {
+        self.link.common.stops.look();
         let state = match arm.next_state() {
             Ok(state) => state,
             Err(error) => {
@@ -227,8 +228,7 @@ impl ArmWorker {
         loop {
             match ready.try_recv() {
                 Err(TryRecvError::Empty)
-                    if self.link.setup.clock.now() <= deadline
-                        && !self.link.common.is_ending.load(Ordering::Acquire) =>
+                    if self.link.setup.clock.now() <= deadline && !self.link.common.stops.is_ending() =>
                 {
                     self.see_next(arm);
                 }
@@ -243,9 +243,10 @@ impl ArmWorker {
         match order {
             ArmOrder::Recover(reply) => {
                 let recovered = arm.recover().inspect(|()| self.link.common.recovered());
-                let recovered = recovered.map(|()| "the arm may move again".to_owned());
+                let recovered = recovered.map_err(|error| error.to_string());
+                let recovered = recovered.and_then(|()| self.link.common.stops.recover());
                 self.link.common.done();
-                reply.send(trigger(recovered.map_err(|error| error.to_string())));
+                reply.send(trigger(recovered.map(|()| "the arm may move again".to_owned())));
             }
             ArmOrder::All(reply) => {
                 let results = self.probe(folder, &[], &ProbeSettings::default(), arm, None);
@@ -352,14 +353,18 @@ impl ArmWorker {
         let wanted = Wanted::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
             let scene_allows = self.link.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
-            if !scene_allows || !self.link.setup.shared.parameters().bool("allow_motion") {
-                let whose =
-                    if scene_allows { "the parameter allow_motion" } else { "allow_motion under robot in the scene" };
-                let why = format!("the arm may not move: look at a dry run first, then set {whose}");
-                return Err((ProbeResult::MOTION_NOT_ALLOWED, why));
+            if !scene_allows {
+                let why =
+                    "the arm may not move: look at a dry run first, then set robot.allow_motion: true in the scene";
+                return Err((ProbeResult::MOTION_NOT_ALLOWED, why.to_owned()));
             }
-            if let Some((code, why)) = self.link.common.why_not() {
-                return Err((code, why.to_owned()));
+            match self.link.common.stops.why(StopRequest::Retract) {
+                Some((code @ ProbeResult::MOTION_NOT_ALLOWED, why)) => {
+                    let how = "look at a dry run first, then start the node again with -p allow_motion:=true";
+                    return Err((code, format!("{why}: {how}")));
+                }
+                Some((code, why)) => return Err((code, why.to_owned())),
+                None => {}
             }
         }
         self.link.common.ready().map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
@@ -402,6 +407,7 @@ impl ArmWorker {
             Err(error) => return refused(target, ProbeResult::BAD_REQUEST, format!("nothing is planned: {error}")),
         }
         let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(target);
+        self.link.common.stops.enter(Motion::Rests);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {
             self.link.common.stop(&probed.ending.to_string());
@@ -425,7 +431,9 @@ impl ArmWorker {
             self.port.publish(Publication::ProbeTouch(touch));
         }
         let mut result = result_of(target, &probed);
-        if let (ProbeResult::CANCELLED, Some((code, why))) = (result.code, self.link.common.why_not()) {
+        if let Ending::Cancelled(request) = probed.ending
+            && let Some((code, why)) = self.link.common.stops.why(request)
+        {
             result.message = format!("{why}: {}", result.message);
             // the others are refused before they begin
             if code == ProbeResult::SHUTDOWN {
@@ -439,4 +447,5 @@ impl ArmWorker {
 /// Beside the recording of a session.
 const TOUCHES: &str = "probed_touches.jsonl";
 const BUSY: &str = "the arm works at an order: wait, or cancel that";
+const HAS_ENDED: &str = "the arm's thread has ended: start the node again";
 const NO_TARGETS: &str = "the features did not answer in time: ask again";

@@ -17,6 +17,7 @@ use crate::ros::node::frame_resolver::CELL;
 use crate::ros::node::setup::Setup;
 use crate::ros::node::side_work::begin;
 use crate::ros::port::{Feedback, SamplePort};
+use crate::ros::stop::Motion;
 use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
 /// Feedback comes at least so often while the arm moves.
@@ -142,6 +143,7 @@ impl<'a> ArmWorld<'a> {
 impl Observer for ArmWorld<'_> {
     fn on_state(&mut self, state: &ArmState) {
         self.last = Some(*state);
+        self.link.common.stops.look();
         self.link.common.see(state);
         self.link.publish(state);
         if self.link.setup.clock.since(self.feedback_sent) >= FEEDBACK_EVERY {
@@ -150,7 +152,7 @@ impl Observer for ArmWorld<'_> {
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        (self.link.common.why_not().is_some() || is_cancelled(self.watched)).then_some(StopRequest::Retract)
+        self.link.common.stops.request().or(is_cancelled(self.watched).then_some(StopRequest::Retract))
     }
 }
 
@@ -171,6 +173,7 @@ impl World for ArmWorld<'_> {
 
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
+        self.link.common.stops.enter(if phase == Phase::Retract { Motion::Retracts } else { Motion::Moves });
         self.send_feedback();
     }
 }

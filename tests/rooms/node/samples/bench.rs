@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::mpsc::sync_channel;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -13,9 +12,10 @@ use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::TriMesh;
 use touchup::ros::in_process::{OtherParticipants, start};
+use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, SetBoolRequest, Time, Transform, TransformStamped,
-    Vector3, Wrench, WrenchStamped,
+    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Transform, TransformStamped, Vector3, Wrench,
+    WrenchStamped,
 };
 use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
@@ -148,8 +148,8 @@ impl Bench {
         for (name, value) in set {
             parameters.set(name, value).unwrap();
         }
-        let (inbox, arrivals) = sync_channel(INBOX);
         let (clock, hand) = Clock::manual();
+        let (inbox, arrivals) = inbox(INBOX, &clock);
         let (port, world) = start(inbox, &clock);
         let node = Prepared::on(clock.clone(), parameters).unwrap().start(port, arrivals, None).unwrap();
         Self { node, world, clock, hand, published: Vec::new() }
@@ -195,8 +195,7 @@ impl Bench {
 
     /// Returns when all that arrived was taken.
     pub fn taken(&self) {
-        let pause = SetBoolRequest { data: false };
-        self.world.call(|reply| Call::Pause(pause, reply)).recv().unwrap();
+        self.world.call(Call::ArmState).recv().unwrap();
     }
 
     /// Time passes.

@@ -15,8 +15,7 @@ use rand_pcg::Pcg64Mcg;
 use touchup::io::recording::{RecordingReader, Topics};
 use touchup::ros::messages::{
     DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, Point, PointStamped, ProbeFeatureRequest,
-    ProbeResult, ResyncMeshRequest, SaveMeshRequest, SetBoolRequest, TFMessage, TransformStamped, UndoRequest,
-    UnflagFeatureRequest,
+    ProbeResult, ResyncMeshRequest, SaveMeshRequest, TFMessage, TransformStamped, UndoRequest, UnflagFeatureRequest,
 };
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{ArmOrder, Arrival, Call, Publication};
@@ -292,10 +291,14 @@ fn pause_undo_redo_and_reset() {
     let redone = call(1, false);
     assert!(redone.strokes == 1 && redone.mesh_version > undone.mesh_version);
     bench.feed(&plate.messages[half..]);
-    let pause = |data| bench.call(|reply| Call::Pause(SetBoolRequest { data }, reply));
-    assert!(pause(true).success);
+    let pause = |is_paused| {
+        // what was sent before counts as before
+        bench.taken();
+        assert!(bench.world.stops().pause(is_paused).success);
+    };
+    pause(true);
     bench.feed(&plate.messages[..100]);
-    assert!(pause(false).success);
+    pause(false);
     let first = bench.node.folder().to_owned();
     let reset = bench.call(Call::Reset);
     assert!(reset.success, "{}", reset.message);

@@ -1,0 +1,315 @@
+//! What stops the arm of the node, and the samples.
+//!
+//! Whoever asks for a stop sets it here, on the thread that hears the request; the arm's thread reads it after each of its states. So
+//! a stop waits for no queue and for no other thread: it acts within one period of the arm, and the answer goes out at once. The
+//! table of events is in docs/ros.md.
+
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use super::locked;
+use super::messages::{ProbeResult, SetBoolResponse, TriggerResponse};
+use super::parameters::{ParameterError, ParameterValue, descriptor};
+use crate::clock::Clock;
+use crate::probing::arm::StopRequest;
+
+/// The parameter that only the start of the node sets to true.
+pub const ALLOW_MOTION: &str = "allow_motion";
+/// An arm's thread that has not looked here for so long hangs, or its arm keeps it waiting: it looks with each state, some 500 a
+/// second, and five times a second while none comes.
+const HANGS: Duration = Duration::from_secs(1);
+/// Why an order or a stop of an arm does nothing where there is none.
+pub const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
+/// What is left where the arm's thread does not stop it.
+const BY_HAND: &str = "if the arm moves, press its emergency stop";
+
+/// What the arm does now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Motion {
+    /// Nothing moves it.
+    #[default]
+    Rests,
+    /// It goes to a feature, or touches it.
+    Moves,
+    /// It goes back into free air, at the end or after a stop.
+    Retracts,
+}
+
+/// The thread of the arm.
+#[derive(Clone, Debug, Default)]
+enum ArmThread {
+    /// There is none.
+    #[default]
+    None,
+    /// It runs, and looked last then.
+    Runs(Instant),
+    /// It has ended, and why.
+    Ended(String),
+}
+
+#[derive(Debug)]
+struct Stops {
+    is_ending: bool,
+    is_paused: bool,
+    may_move: bool,
+    /// why the arm stays where it is, until it is recovered
+    stay: Option<&'static str>,
+    /// `~/recover` was called after that
+    is_recovery_asked: bool,
+    motion: Motion,
+    thread: ArmThread,
+}
+
+impl Stops {
+    fn request(&self) -> Option<StopRequest> {
+        let retract = self.is_ending || self.is_paused || !self.may_move;
+        self.stay.map(|_| StopRequest::Stay).or(retract.then_some(StopRequest::Retract))
+    }
+
+    /// Whether a request before this one has the arm retract, or it does so by itself.
+    fn goes_back(&self) -> bool {
+        self.motion == Motion::Retracts || (self.motion == Motion::Moves && self.request().is_some())
+    }
+
+    fn stay(&mut self, why: &'static str) {
+        (self.stay, self.is_recovery_asked) = (Some(why), false);
+    }
+
+    /// Why nobody hears a request, where nobody does.
+    fn unheard(&self, clock: &Clock) -> Option<String> {
+        match &self.thread {
+            ArmThread::None => None,
+            ArmThread::Runs(looked) => {
+                let since = clock.since(*looked);
+                let seconds = since.as_secs_f64();
+                (since > HANGS).then(|| format!("nothing has come from the arm's thread for {seconds:.1} s: {BY_HAND}"))
+            }
+            ArmThread::Ended(why) => Some(format!("the arm's thread has ended, {why}: {BY_HAND}")),
+        }
+    }
+}
+
+/// What stops the arm of the node, and the samples.
+#[derive(Debug)]
+pub struct StopState {
+    clock: Clock,
+    stops: Mutex<Stops>,
+}
+
+impl StopState {
+    /// Nothing stops anything yet.
+    ///
+    /// - `clock`: by which a thread hangs.
+    pub fn new(clock: Clock) -> Self {
+        let stops = Stops {
+            is_ending: false,
+            is_paused: false,
+            may_move: true,
+            stay: None,
+            is_recovery_asked: false,
+            motion: Motion::Rests,
+            thread: ArmThread::None,
+        };
+        Self { clock, stops: Mutex::new(stops) }
+    }
+
+    /// `~/pause`: samples are passed over, what moves stops and retracts. It fails where the arm's thread does not hear it.
+    pub fn pause(&self, is_paused: bool) -> SetBoolResponse {
+        let mut stops = locked(&self.stops);
+        stops.is_paused = is_paused;
+        let words = if is_paused { "paused: samples are passed over" } else { "samples are taken" };
+        let done = match stops.thread {
+            _ if !is_paused => Ok(""),
+            ArmThread::None => Ok(""),
+            _ => stops.unheard(&self.clock).map_or(Ok("; the arm does not move, or stops and retracts"), Err),
+        };
+        let success = done.is_ok();
+        let message = done.map_or_else(|why| format!("{words}; but {why}"), |arm| words.to_owned() + arm);
+        SetBoolResponse { success, message }
+    }
+
+    /// Whether samples are passed over.
+    pub fn is_paused(&self) -> bool {
+        locked(&self.stops).is_paused
+    }
+
+    /// `~/stop`: what moves stops and stays, a retraction too; nothing moves until `~/recover`. It fails where there is no arm, or
+    /// its thread does not hear it.
+    pub fn stop(&self) -> TriggerResponse {
+        let mut stops = locked(&self.stops);
+        stops.stay("~/stop was called");
+        let done = match stops.thread {
+            ArmThread::None => Err(NO_ARM.to_owned()),
+            _ => stops.unheard(&self.clock).map_or(Ok(()), Err),
+        };
+        let message = done.clone().map_or_else(
+            |why| format!("the stop is set; but {why}"),
+            |()| "the arm stops and stays where it is: look, then call ~/recover".to_owned(),
+        );
+        TriggerResponse { success: done.is_ok(), message }
+    }
+
+    /// The parameter `allow_motion`: what moves stops and retracts; a retraction stops and stays.
+    ///
+    /// # Errors
+    /// [`ParameterError`]: once it is false it stays so.
+    pub fn allow(&self, may_move: &ParameterValue) -> Result<(), ParameterError> {
+        let mut stops = locked(&self.stops);
+        let now = ParameterValue::Bool(stops.may_move);
+        if descriptor(ALLOW_MOTION)?.change(&now, may_move)? == ParameterValue::Bool(false) {
+            if stops.goes_back() {
+                stops.stay("allow_motion was taken away while the arm retracted");
+            }
+            stops.may_move = false;
+            if let Some(why) = stops.unheard(&self.clock) {
+                tracing::error!("allow_motion is false; but {why}");
+            }
+        }
+        Ok(())
+    }
+
+    /// The node is to end: what moves stops and retracts; asked for again, it stops and stays. Whether that is new: `false` when
+    /// nothing is left to wait for.
+    pub fn interrupt(&self) -> bool {
+        let mut stops = locked(&self.stops);
+        if !stops.is_ending {
+            stops.is_ending = true;
+            return true;
+        }
+        let is_new = stops.motion != Motion::Rests && stops.stay.is_none();
+        if is_new {
+            stops.stay("the end of the node was asked for again");
+        }
+        is_new
+    }
+
+    /// The node ends, whoever asked for it.
+    pub fn end(&self) {
+        locked(&self.stops).is_ending = true;
+    }
+
+    /// Whether the node ends.
+    pub fn is_ending(&self) -> bool {
+        locked(&self.stops).is_ending
+    }
+
+    /// `~/recover` was called: it holds for the stops until now.
+    pub fn ask_recovery(&self) {
+        locked(&self.stops).is_recovery_asked = true;
+    }
+
+    /// Somebody has looked: the arm may move again.
+    ///
+    /// # Errors
+    /// In words, where it was stopped again since.
+    pub fn recover(&self) -> Result<(), String> {
+        let mut stops = locked(&self.stops);
+        match stops.stay {
+            Some(why) if !stops.is_recovery_asked => {
+                Err(format!("{why} after ~/recover: the arm stays stopped; look, then call ~/recover again"))
+            }
+            _ => {
+                stops.stay = None;
+                Ok(())
+            }
+        }
+    }
+
+    /// The arm's thread looks: to be called when it begins, and with each state.
+    pub fn look(&self) {
+        locked(&self.stops).thread = ArmThread::Runs(self.clock.now());
+    }
+
+    /// The arm's thread has ended. The first reason counts.
+    pub fn end_arm(&self, why: &str) {
+        let mut stops = locked(&self.stops);
+        if let ArmThread::Runs(_) = stops.thread {
+            stops.thread = ArmThread::Ended(why.to_owned());
+        }
+    }
+
+    /// What the arm does from now on.
+    pub fn enter(&self, motion: Motion) {
+        locked(&self.stops).motion = motion;
+    }
+
+    /// How the arm is to stop, where it is.
+    pub fn request(&self) -> Option<StopRequest> {
+        locked(&self.stops).request()
+    }
+
+    /// Why the arm is to stop in this way, where it is: a code of [`ProbeResult`], and in words.
+    pub fn why(&self, request: StopRequest) -> Option<(u8, &'static str)> {
+        let stops = locked(&self.stops);
+        if request == StopRequest::Stay {
+            return stops.stay.map(|why| (ProbeResult::STOPPED_IN_PLACE, why));
+        }
+        let reasons = [
+            (stops.is_ending, ProbeResult::SHUTDOWN, "the node ends"),
+            (stops.is_paused, ProbeResult::PAUSED, "the node is paused"),
+            (!stops.may_move, ProbeResult::MOTION_NOT_ALLOWED, "the parameter allow_motion is off"),
+        ];
+        reasons.into_iter().find(|(is_so, ..)| *is_so).map(|(_, code, why)| (code, why))
+    }
+
+    /// Whether the arm's thread hears what is asked of it.
+    ///
+    /// # Errors
+    /// In words: it hangs or has ended.
+    pub fn heard(&self) -> Result<(), String> {
+        locked(&self.stops).unheard(&self.clock).map_or(Ok(()), Err)
+    }
+
+    /// Whether the arm can be sent anywhere, as far as it is known here.
+    ///
+    /// # Errors
+    /// In words: it was stopped and stays, or its thread hangs or has ended.
+    pub fn ready(&self) -> Result<(), String> {
+        let stops = locked(&self.stops);
+        match (stops.unheard(&self.clock), stops.stay) {
+            (Some(why), _) => Err(why),
+            (None, Some(why)) => Err(format!("the arm is stopped since this: {why}; look, then call ~/recover")),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_answers_say_whether_there_is_an_arm_and_whether_its_thread_hears_them() {
+        let (clock, hand) = Clock::manual();
+        let state = StopState::new(clock);
+        assert!(state.pause(true).success && !state.stop().success && state.stop().message.contains(NO_ARM));
+        state.look();
+        assert!(state.stop().success && state.pause(true).success && state.heard().is_ok());
+        hand.advance(HANGS + Duration::from_millis(500));
+        for (success, message) in [
+            (state.stop().success, state.stop().message),
+            (state.pause(true).success, state.pause(true).message),
+            (state.heard().is_ok(), state.heard().unwrap_err()),
+            (state.ready().is_ok(), state.ready().unwrap_err()),
+        ] {
+            assert!(!success && message.contains("nothing has come from the arm's thread for 1.5 s"), "{message}");
+        }
+        assert_eq!(state.request(), Some(StopRequest::Stay), "it holds all the same");
+        assert!(state.pause(false).success);
+        state.look();
+        assert!(state.stop().success);
+        state.end_arm("at its end");
+        state.end_arm("later");
+        assert!(state.stop().message.contains("has ended, at its end"), "{}", state.stop().message);
+    }
+
+    #[test]
+    fn the_end_is_asked_for_again_only_where_an_arm_moves() {
+        let state = StopState::new(Clock::system());
+        assert!(state.interrupt() && !state.interrupt());
+        state.enter(Motion::Retracts);
+        assert_eq!(state.request(), Some(StopRequest::Retract));
+        assert!(state.interrupt() && !state.interrupt(), "the third waits for nothing");
+        assert_eq!(state.request(), Some(StopRequest::Stay));
+    }
+}
