@@ -11,7 +11,7 @@ use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
 use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry};
 use touchup::probing::execute::{
-    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
+    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, ProbedTouch, Prober, Progress, Tool, World, plan,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
@@ -30,6 +30,8 @@ struct StaticScan {
     stayed_ns: i64,
     seen: usize,
     touches: Vec<usize>,
+    /// as they were made
+    made: Vec<ProbedTouch>,
     /// what the mesh becomes when more than 2 N is measured
     after: Option<TriMesh>,
     /// height of the tip in B when it was wanted to end, and the least since then, m
@@ -40,8 +42,8 @@ impl StaticScan {
     fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
         let (patience, stays_after, stayed_ns) = (None, None, 0);
-        let (seen, touches, after, since_then) = (0, Vec::new(), None, None);
-        Self { mesh, tree, patience, stays_after, stayed_ns, seen, touches, after, since_then }
+        let (seen, touches, made, after, since_then) = (0, Vec::new(), Vec::new(), None, None);
+        Self { mesh, tree, patience, stays_after, stayed_ns, seen, touches, made, after, since_then }
     }
 }
 
@@ -83,6 +85,10 @@ impl World for StaticScan {
     fn publish(&mut self, progress: &Progress) {
         self.touches.push(progress.touch);
     }
+
+    fn touched(&mut self, _: u32, touch: &ProbedTouch) {
+        self.made.push(touch.clone());
+    }
 }
 
 const HOLE: Flag = Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(17e-3, 35e-3, 12e-3), radius: 3e-3 };
@@ -117,6 +123,7 @@ fn a_flag_becomes_a_feature() {
     // each before it is made, and the last again with its result
     let count = probed.touches.len();
     assert_eq!(world.touches, (1..=count).chain([count]).collect::<Vec<_>>());
+    assert_eq!(world.made, probed.touches);
     let records = probed.touches.iter().filter_map(|touch| touch.record.as_ref());
     assert!(records.clone().all(|record| record.stamps_ns[1] > record.stamps_ns[0]));
     assert!(probed.touches.iter().any(|touch| touch.deviation.is_some_and(|deviation| deviation < -0.1e-3)));
@@ -140,6 +147,7 @@ fn a_cancelled_probing_stops_and_retracts() {
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
     assert!(!probed.touches.is_empty());
+    assert_eq!(world.made, probed.touches);
     assert!(end[2] > 14e-3, "{end:?}");
 }
 

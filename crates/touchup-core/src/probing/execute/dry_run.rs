@@ -1,14 +1,15 @@
 //! Dry run: the touches and paths that the current mesh leads to, checked, without moving the arm.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::cell::Cell;
 use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
 use super::route::{FreeSpace, ToolState};
 use super::world::{World, distance};
-use crate::probing::arm::{ArmState, Joints, LimitError};
+use crate::probing::arm::{ArmState, Joints, LimitError, Safety};
 use crate::probing::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
+use crate::stylus::Wrench;
 
 /// A planned motion, with its number from 0 on among those of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -44,6 +45,22 @@ pub struct Plan {
     pub slides: Vec<Slide>,
     /// what cannot be done
     pub held_back: Vec<HeldBack>,
+}
+
+/// About this configuration the arm is folded, rad: joints are chosen within half a turn of it.
+const FOLDED: Joints = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
+
+impl Cell {
+    /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that leaves it most room to move; for
+    /// a plan without an arm. `None` where it does not reach.
+    pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
+        let solutions = self.geometry.inverse(&(pose_bt * self.pose_ft.inverse()), &FOLDED);
+        let dexterity = |joints: &Joints| self.geometry.dexterity(joints);
+        let joints = solutions.into_iter().max_by(|a, b| dexterity(a).total_cmp(&dexterity(b)))?;
+        let nothing = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
+        let (wrench_b, raw_wrench_f) = (nothing, nothing);
+        Some(ArmState { stamp_ns: 0, pose_bt: *pose_bt, wrench_b, raw_wrench_f, joints, safety: Safety::Normal })
+    }
 }
 
 /// Plans the probing of a flag.

@@ -7,7 +7,7 @@ use super::prober::{Flag, Prober};
 use super::route::ToolState;
 use super::world::{Phase, Progress, World};
 use crate::probing::arm::{OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED};
-use crate::probing::plan::{ExploreError, Explorer, TouchPlan, TouchResult};
+use crate::probing::plan::{Explorer, TouchPlan, TouchResult};
 
 /// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
 pub(super) struct FeatureProbing<'p, 'a> {
@@ -57,8 +57,7 @@ impl<'a> Prober<'a> {
         let ending = match (ended, &found) {
             (Err(ending), _) => ending,
             (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
-            // not done: the search did not end
-            (Ok(()), Ok(_) | Err(ExploreError::NotDone { .. })) => Ending::TouchesSpent,
+            (Ok(()), Ok(_)) => Ending::TouchesSpent,
             (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
         };
         Probed {
@@ -134,6 +133,7 @@ impl FeatureProbing<'_, '_> {
         // zeroed again for each, as another touch has nothing to do with it
         self.is_zeroed = false;
         let (_, touched) = self.go_and_touch(planned)?;
+        self.prober.world.touched(self.flag, &touched);
         self.retract()?;
         Ok(touched)
     }
@@ -157,6 +157,7 @@ impl FeatureProbing<'_, '_> {
                 }
                 Err(ending) => return Err(ending),
             };
+            self.prober.world.touched(self.flag, &touch);
             explorer.take(&result);
             self.touches.push(touch);
         }

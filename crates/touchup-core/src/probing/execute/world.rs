@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use super::ending::ProbedTouch;
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer};
 
@@ -31,6 +32,11 @@ pub trait World: Observer {
 
     /// Receives the phase that begins.
     fn enter(&mut self, _: Phase) {}
+
+    /// Receives each touch when it is made, before the arm goes on; also one that cannot be made, with the reason.
+    ///
+    /// - `flag`: number of the feature; 0 for the touches of a spot.
+    fn touched(&mut self, _flag: u32, _touch: &ProbedTouch) {}
 }
 
 /// What an arm does while it probes.
