@@ -1,13 +1,13 @@
 //! The arm that a verb works with: a simulated one, or a UR.
 
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
 use super::CliError;
-use super::probing::{Ready, millimetres};
+use super::probing::{Ready, SpotWorld, millimetres};
 use super::progress::WorkProgress;
+use super::signals::StopSignals;
 use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
@@ -91,6 +91,14 @@ pub(super) struct CellArguments {
     seed: u64,
 }
 
+/// Where the touches of a measurement go.
+#[derive(Debug, Args)]
+pub(super) struct TouchesOutput {
+    /// Output: each touch as it is made, a line of JSON each, so that none is lost whatever ends the measurement
+    #[arg(long, value_name = "JSONL", requires = "robot")]
+    pub touches_out: Option<PathBuf>,
+}
+
 /// True payload of a simulated arm, where it differs from the scene.
 #[derive(Debug, Args)]
 #[group(id = "true_payload")]
@@ -148,15 +156,17 @@ impl CellArguments {
         }
     }
 
-    /// Measures something with the probe of an arm about the scan as it is; returns also the cell.
+    /// Measures something with the probe of an arm about the scan as it is, until a signal stops it; returns also the cell.
     ///
     /// - `stage`: what this is called while it lasts.
+    /// - `touches`: where each touch is written as it is made.
     /// - `truth`: as in [`Self::with`].
-    pub fn measure<T, E: Display>(
+    pub fn measure<T, E: Into<CliError>>(
         &self,
         robot: RobotName,
         scene: &Path,
         stage: &'static str,
+        touches: Option<&Path>,
         truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
     ) -> Result<(T, Cell), CliError> {
@@ -165,9 +175,12 @@ impl CellArguments {
         ready.may_move()?;
         let _measuring = WorkProgress::stage(stage);
         let truth = |arm| truth(arm, &ready.scene);
+        let signals = StopSignals::listen()?;
         let measured = self.with(robot, &ready, truth, |arm| {
-            let mut world = ready.static_world();
-            work(&mut Prober::new(arm, &ready.cell, &ready.params, &mut world)).map_err(CliError::arm)
+            let mut world = SpotWorld::new(&ready, touches, &signals)?;
+            let measured = work(&mut Prober::new(arm, &ready.cell, &ready.params, &mut world));
+            signals.arm_is_at_rest();
+            world.finish(measured.map_err(Into::into))
         })?;
         Ok((measured, ready.cell))
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arm::ArmArguments;
+use super::arm::{ArmArguments, TouchesOutput};
 use super::probing::millimetres;
 use super::{CliError, Losses, print_report, reported, require, require_positive};
 use crate::probing::execute::{Repeatability, SpotTouch};
@@ -30,15 +30,17 @@ pub(super) struct CheckArguments {
     /// Gate: largest distance of a touch from the mean, µm
     #[arg(long, value_name = "G", default_value_t = 25.0)]
     gate_um: f64,
+    #[command(flatten)]
+    output: TouchesOutput,
     /// Prints the result as one JSON object
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
-    let CheckArguments { arm, scene, spot, touches, gate_um, json } = arguments;
+    let CheckArguments { arm, scene, spot, touches, gate_um, output, json } = arguments;
     require_positive("--gate-um", *gate_um)?;
-    let found = repeated(arm, scene, spot, *touches)?;
+    let found = repeated(arm, scene, spot, *touches, output)?;
     let checked = Checked::of(&found, *gate_um);
     print_report(*json, &checked, || checked.to_string());
     let why = format!(
@@ -56,12 +58,14 @@ pub(super) fn repeated(
     scene: &Path,
     spot: &str,
     touches: usize,
+    output: &TouchesOutput,
 ) -> Result<Repeatability, CliError> {
     let place = Point3::from(millimetres("--spot", spot)?);
     let (least, most) = (TOUCHES.start(), TOUCHES.end());
     require(TOUCHES.contains(&touches), format!("--touches {touches} must be {least} to {most}"))?;
     let ArmArguments { robot, cell } = arm;
-    let found = cell.measure(*robot, scene, "touch", |arm, _| Ok(arm), |prober| prober.repeat(&place, touches))?;
+    let out = output.touches_out.as_deref();
+    let found = cell.measure(*robot, scene, "touch", out, |arm, _| Ok(arm), |prober| prober.repeat(&place, touches))?;
     Ok(found.0)
 }
 

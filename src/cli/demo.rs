@@ -80,7 +80,8 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &stylus, None, &arguments.out)?;
 
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
-    let files = RefineArguments::in_folder(out.join("scan.ply"), unit, out, None, Topics::default());
+    let files =
+        RefineArguments::in_folder(out.join("scan.ply"), unit, out.join("touch.mcap"), out, None, Topics::default());
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit)?;

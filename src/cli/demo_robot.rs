@@ -14,11 +14,13 @@ use super::compare::{CompareArguments, compared};
 use super::found::kind_of;
 use super::probing::{Done, Probing, ProbingSummary};
 use super::progress::WorkProgress;
+use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
 use crate::features::{Feature, Measured};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
+use crate::probing::arm::Arm;
 use crate::probing::execute::{Flag, Probed};
 use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
 
@@ -81,8 +83,10 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let ready = probing.ready()?;
     let start = ready.cell.above(&truth);
     let mut arm = SimArm::new(&plate, ready.simulated_arm(seed), &start)?;
-    probing.planned(&ready, &mut arm)?;
-    let Done { summary, probed, losses } = probing.done(&ready, &mut arm)?;
+    let now = arm.next_state().map_err(CliError::arm)?;
+    probing.planned(&ready, &now)?;
+    // nothing real moves: a signal ends it as any other verb
+    let Done { summary, probed, outcome } = probing.done(&ready, &mut arm, false, &StopSignals::default())?;
 
     let named = probed.iter().filter_map(feature_of).map(FeatureRecord::of).collect();
     compared(&CompareArguments::in_folder(out, named))?;
@@ -96,7 +100,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
         out.display()
     ));
-    Ok(losses)
+    outcome
 }
 
 fn feature_of(probed: &Probed) -> Option<&Feature> {

@@ -14,6 +14,7 @@ use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::touches_file::TouchesFileError;
+use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
 use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -33,12 +34,16 @@ pub(super) struct CliError {
     pub message: String,
     /// what to do next, where the message does not say it
     pub hint: Option<&'static str>,
-    /// 1 to 4, as `touchup --help` lists them
+    /// as `touchup --help` lists them
     pub exit_code: u8,
 }
 
 /// Kind and exit code of a result that is not there.
 const NOT_WRITTEN: (&str, u8) = ("not_written", 1);
+/// Kind and exit code of an arm that stopped.
+const STOPPED: (&str, u8) = ("stopped", 5);
+/// Kind and exit code of work with an arm that a signal ended.
+pub(super) const INTERRUPTED: (&str, u8) = ("interrupted", 130);
 
 impl CliError {
     /// - `cause`: where it is one of a room, in which a missing file may be the reason.
@@ -54,6 +59,7 @@ impl CliError {
             _ if of_system.any(|cause| cause.kind() == ErrorKind::NotFound) => {
                 Some("check the path: no file is there; a relative path begins at the present folder")
             }
+            "stopped" => Some("look at the arm and at what is around it; a protective stop is released at its panel"),
             "scene" => Some("config/touchup.yaml lists every parameter with its unit and range"),
             _ => None,
         };
@@ -83,6 +89,20 @@ impl CliError {
     /// What an arm, or its work, came to.
     pub fn arm(error: impl Display) -> Self {
         Self::new(("arm", 1), error, None)
+    }
+
+    /// How the work of an arm ended before it was done.
+    pub fn ended(ending: &Ending) -> Self {
+        match ending {
+            Ending::Cancelled(request) => Self::new(INTERRUPTED, format_args!("interrupted: {request}"), None),
+            Ending::Stopped(_) => Self::new(STOPPED, ending, None),
+            ending => Self::arm(ending),
+        }
+    }
+
+    /// The same error with more of what the user has to know.
+    pub fn with(self, more: impl Display) -> Self {
+        Self { message: one_line(&format!("{}; {more}", self.message)), ..self }
     }
 
     /// Why a feature cannot be probed.
@@ -199,6 +219,18 @@ fn of_touches(error: &TouchesFileError) -> (&'static str, u8) {
 
 fn of_features(error: &FeaturesFileError) -> (&'static str, u8) {
     if matches!(error, FeaturesFileError::File(FileError::Write { .. })) { NOT_WRITTEN } else { ("features", 3) }
+}
+
+impl From<SpotError> for CliError {
+    fn from(error: SpotError) -> Self {
+        if let SpotError::Ended(ending) = &error { Self::ended(ending) } else { Self::arm(error) }
+    }
+}
+
+impl From<PayloadProbeError> for CliError {
+    fn from(error: PayloadProbeError) -> Self {
+        if let PayloadProbeError::Ended(ending) = &error { Self::ended(ending) } else { Self::arm(error) }
+    }
 }
 
 impl From<ReplayError> for CliError {

@@ -1,8 +1,8 @@
 //! The command line: one file for each verb.
 //!
 //! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
-//! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named. With `--json` an error is one object
-//! on stderr.
+//! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named, 5 the arm stopped, 130 a signal stopped it.
+//! With `--json` an error is one object on stderr.
 
 mod arm;
 mod calibrate;
@@ -27,6 +27,7 @@ mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
 mod report;
+mod signals;
 mod simulate;
 mod step;
 mod threads;
@@ -36,10 +37,8 @@ mod ur;
 pub use threads::Threads;
 
 use error::{CliError, Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
-#[cfg(any(feature = "ros", feature = "r2r"))]
-use output::notify;
 use output::{
-    by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, print_report, print_result,
+    by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify, print_report, print_result,
     write_json,
 };
 
@@ -64,7 +63,13 @@ struct Arguments {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 result not written, 2 wrong usage, 3 bad input file, \
-                          4 done with losses (named on stderr)";
+                          4 done with losses (named on stderr), 5 the arm stopped, 130 a signal stopped it";
+
+const ARM_SIGNALS: &str = "\
+Ctrl-C (or SIGTERM) stops the arm and retracts it; a second one has it stay where it is. What was measured is kept.
+
+Exit codes: 0 all as asked, 1 no result, 2 wrong usage, 3 bad input file, 4 not found, or not within tolerance or gate (named on stderr), \
+5 the arm stopped, 130 a signal stopped it.";
 
 const STEP_FIELDS: &str = "\
 In, one object per line: p_m, force_n, b_m, n (arrays of three), dt_s, h_min_m, delta, f_max_n, alpha_m_per_n_s,
@@ -79,7 +84,7 @@ ROS_AUTOMATIC_DISCOVERY_RANGE are heeded. Topics, services and parameters: docs/
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Identifies parameters of the scene: pose of the scan, payload of the sensor, centre of the ball
-    #[command(subcommand)]
+    #[command(subcommand, after_help = ARM_SIGNALS)]
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
     Demo(demo::DemoArguments),
@@ -92,8 +97,10 @@ enum Verb {
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
     Features(features::FeaturesArguments),
     /// Probes flagged features with an arm
+    #[command(after_help = ARM_SIGNALS)]
     Probe(probe::ProbeArguments),
     /// Checks the repeatability of an arm on one spot
+    #[command(after_help = ARM_SIGNALS)]
     Check(check::CheckArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),

@@ -2,12 +2,11 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::thread::Builder;
 
 use clap::Args;
-use tokio::signal::unix::{SignalKind, signal};
 
 use super::arm::connect_ur;
+use super::signals::{SignalKind, on_each_signal};
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require};
 use crate::clock::Clock;
 use crate::io::mesh_file::{MeshFile, read_mesh};
@@ -91,37 +90,18 @@ impl NodeArguments {
 /// The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still retracts stop and
 /// stay; one more, or the second where no arm moves, waits for nothing.
 fn end_on_signals(inbox: Inbox) -> std::io::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
-    let mut signals = {
-        let _entered = runtime.enter();
-        [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()]
-            .map(signal)
-            .into_iter()
-            .collect::<Result<Vec<_>, _>>()?
-    };
-    let listen = move || {
-        runtime.block_on(any(&mut signals));
-        notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
-        // a node that has ended already needs none
-        inbox.put(Arrival::Shutdown);
-        loop {
-            runtime.block_on(any(&mut signals));
-            if !inbox.stops().interrupt() {
-                std::process::exit(1);
-            }
-            notify("the arm stops and stays where it is; one more signal ends the node at once");
+    on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()], move |count| {
+        if count == 1 {
+            notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
+            // a node that has ended already needs none
+            inbox.put(Arrival::Shutdown);
+            return;
         }
-    };
-    Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
-}
-
-/// Waits for any of them.
-async fn any(signals: &mut [tokio::signal::unix::Signal]) {
-    std::future::poll_fn(|context| match signals.iter_mut().any(|signal| signal.poll_recv(context).is_ready()) {
-        true => std::task::Poll::Ready(()),
-        false => std::task::Poll::Pending,
+        if !inbox.stops().interrupt() {
+            std::process::exit(1);
+        }
+        notify("the arm stops and stays where it is; one more signal ends the node at once");
     })
-    .await;
 }
 
 fn losses(report: &SessionReport) -> Losses {

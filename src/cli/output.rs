@@ -28,7 +28,6 @@ pub(super) fn by_reason(counts: &BTreeMap<String, u64>) -> String {
 }
 
 /// One line on stderr that is no error.
-#[cfg(any(feature = "ros", feature = "r2r"))]
 pub(super) fn notify(line: &str) {
     let _ = writeln!(io::stderr(), "touchup: {}", line.replace('\n', " "));
 }

@@ -4,10 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
+use nalgebra::Point3;
 use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
-use super::probing::{Done, Probing, Ready, flag_of};
+use super::probing::{Done, Probing, Ready, flag_of, millimetres};
+use super::signals::StopSignals;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
@@ -40,10 +42,17 @@ pub(super) struct ProbeArguments {
     /// Slides over the found feature with constant force, so that the mesh follows: along walls and across rims
     #[arg(long)]
     slide: bool,
-    /// Plans, checks reach and paths, draws the plan, and moves nothing
+    /// Plans, checks reach and paths, and draws the plan, by the scene alone: no arm is asked, none moves
     #[arg(long)]
     dry_run: bool,
-    /// Folder for plan.png, touches.png, probed.json, probed_touches.jsonl, touch.mcap, refined.ply, features.json, touches.csv
+    /// Where the ball is when the plan of --dry-run begins, in the frame of the scan, mm; default: 40 mm above the scan
+    #[arg(long, value_name = "X,Y,Z", requires = "dry_run", allow_hyphen_values = true)]
+    from_mm: Option<String>,
+    /// Goes on with a probing that was broken off in the folder of --out: what is finished there is not probed again
+    #[arg(long, conflicts_with = "dry_run")]
+    resume: bool,
+    /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json, refined.ply, features.json, touches.csv,
+    /// touches.png
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Prints the result as one JSON object
@@ -65,7 +74,14 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
     };
     let mut ready = probing.ready()?;
     arguments.narrow(&mut ready)?;
-    cell.with(*robot, &ready, Ok, |arm| arguments.run(&probing, &ready, arm))
+    if arguments.dry_run || !ready.is_motion_allowed() {
+        return arguments.plan_alone(&probing, &ready);
+    }
+    if !arguments.resume {
+        probing.check_free()?;
+    }
+    let signals = StopSignals::listen()?;
+    cell.with(*robot, &ready, Ok, |arm| arguments.run(&probing, &ready, arm, &signals))
 }
 
 impl ProbeArguments {
@@ -95,27 +111,52 @@ impl ProbeArguments {
         Ok(())
     }
 
-    fn run(&self, probing: &Probing<'_>, ready: &Ready, arm: &mut dyn Arm) -> Result<Losses, CliError> {
-        let plans = probing.planned(ready, arm)?;
-        if self.dry_run {
-            let report = DryRunReport::of(probing.flags, &plans, self.out.join("plan.png"));
-            print_report(self.json, &report, || report.to_string());
-            return Ok(Losses::new());
+    /// Plans with no arm at all: as from where `--from-mm` says.
+    fn plan_alone(&self, probing: &Probing<'_>, ready: &Ready) -> Result<Losses, CliError> {
+        let from = self.from_mm.as_ref().map(|text| millimetres("--from-mm", text)).transpose()?;
+        let (pose_bt, place) = ready.start(from.map(Point3::from));
+        let [x, y, z] = (place * 1e3).coords.into();
+        let why = || {
+            format!(
+                "the arm does not reach ({x:.1} {y:.1} {z:.1}) mm, where the plan begins: name a place by --from-mm"
+            )
+        };
+        let now = ready.cell.at_rest(&pose_bt).ok_or_else(|| CliError::usage(why()))?;
+        let plans = probing.planned(ready, &now)?;
+        if !self.dry_run {
+            return ready.may_move().map(|()| Losses::new());
         }
-        ready.may_move()?;
-        let Done { summary, losses, .. } = probing.done(ready, arm)?;
+        let report = DryRunReport::of(probing.flags, &plans, [x, y, z], self.out.join("plan.png"));
+        print_report(self.json, &report, || report.to_string());
+        Ok(Losses::new())
+    }
+
+    fn run(
+        &self,
+        probing: &Probing<'_>,
+        ready: &Ready,
+        arm: &mut dyn Arm,
+        signals: &StopSignals,
+    ) -> Result<Losses, CliError> {
+        let now = arm.next_state().map_err(CliError::arm)?;
+        probing.planned(ready, &now)?;
+        let Done { summary, outcome, .. } = probing.done(ready, arm, self.resume, signals)?;
         print_report(self.json, &summary, || {
-            let files =
-                ["plan.png", "touches.png", "probed.json"].map(|name| self.out.join(name).display().to_string());
+            let names = ["plan.png", "touches.png", "probed.json"];
+            let are_all = summary.refine.is_some();
+            let written = names.iter().filter(|name| are_all || **name != "touches.png");
+            let files: Vec<_> = written.map(|name| self.out.join(name).display().to_string()).collect();
             format!("{summary}\nwrote {}", files.join(", "))
         });
-        Ok(losses)
+        outcome
     }
 }
 
 reported! {
     /// What `--dry-run --json` prints.
-    struct DryRunReport, fn of(flags: &[Flag], plans: &[Plan], drawn: PathBuf) {
+    struct DryRunReport, fn of(flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], drawn: PathBuf) {
+        /// centre of the ball where the plan begins, in the frame of the scan
+        from_mm: [f64; 3] = start_mm,
         features: Vec<PlannedFeature> =
             flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
         picture: PathBuf = drawn,
@@ -165,6 +206,8 @@ impl fmt::Display for DryRunReport {
             write!(f, " and {made} of {}", counted(slides, "slide", "slides"))?;
         }
         writeln!(f, " can be made; nothing moved")?;
+        let [x, y, z] = self.from_mm;
+        writeln!(f, "planned from ({x:.1} {y:.1} {z:.1}) mm by the scene alone, without asking an arm where it is")?;
         for one in &self.features {
             write!(f, "feature {}: {}", one.flag, counted(one.touches, "touch", "touches"))?;
             if one.slides > 0 {
@@ -202,7 +245,8 @@ mod tests {
         };
         assert_eq!(numbers(&planned.unreachable_touches), [(1, "reason 1".to_owned())]);
         assert_eq!(numbers(&planned.unreachable_slides), [(0, "reason 2".to_owned())]);
-        let text = DryRunReport { features: vec![planned], picture: PathBuf::from("plan.png") }.to_string();
+        let text =
+            DryRunReport { from_mm: [0.0; 3], features: vec![planned], picture: PathBuf::from("plan.png") }.to_string();
         assert!(text.starts_with("1 of 2 planned touches can be made; nothing moved\n"), "{text}");
         assert!(text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"), "{text}");
     }

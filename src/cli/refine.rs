@@ -241,15 +241,16 @@ fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
 }
 
 impl RefineArguments {
-    /// Takes touch.mcap of a folder, and writes refined.ply, features.json and touches.csv into it.
+    /// Writes refined.ply, features.json and touches.csv into a folder.
     pub(super) fn in_folder(
         scan: PathBuf,
         mesh_unit: MeshUnit,
+        bag: PathBuf,
         folder: &Path,
         scene: Option<PathBuf>,
         topics: Topics,
     ) -> Self {
-        let [bag, out] = ["touch.mcap", "refined.ply"].map(|name| folder.join(name));
+        let out = folder.join("refined.ply");
         let [features_out, touches_out] = ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
         let Topics { pose: pose_topic, wrench: wrench_topic, markers: markers_topic } = topics;
         let files = Self { scan, bag, out, mesh_unit, scene, features_out, touches_out, ..Self::default() };

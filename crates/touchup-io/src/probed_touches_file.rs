@@ -1,35 +1,68 @@
 //! `probed_touches.jsonl`: all that was seen of each touch of an arm, a line of JSON each.
+//!
+//! Each line is on the disk before the arm makes the next touch, so that whatever ends the program loses none of them. What a
+//! crash leaves of a line is no touch.
 
-use std::fs::OpenOptions;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::atomic::write_atomically;
+use serde::Deserialize;
+
 use touchup_core::probing::arm::{Onset, TouchMoment, TouchOutcome};
 use touchup_core::probing::execute::{Probed, ProbedTouch};
 
 reported! {
     /// One line; lengths in mm of O, travel along the approach.
-    struct TouchLine, fn of(feature: u32, number: usize, touch: &ProbedTouch, ball_radius: f64, offset_ns: i64) {
-        flag: u32 = feature,
-        index: usize = number,
-        begun_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[0] + offset_ns),
-        ended_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[1] + offset_ns),
+    #[derive(Deserialize)]
+    pub struct TouchLine, pub fn of(feature: u32, number: usize, touch: &ProbedTouch, ball_radius: f64, offset_ns: i64) {
+        /// number of the feature
+        pub flag: u32 = feature,
+        /// among the touches of the feature, from 0 on
+        pub index: usize = number,
+        /// by the clock of the recording
+        pub begun_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[0] + offset_ns),
+        /// by the clock of the recording
+        pub ended_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[1] + offset_ns),
         /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it was not made
-        verdict: &'static str = verdict(touch),
-        accepted: bool = touch.refused.is_none(),
-        reason?: String = touch.refused.clone(),
-        from_mm: [f64; 3] = (touch.planned.from * 1e3).coords.into(),
-        approach: [f64; 3] = touch.planned.direction.into_inner().into(),
-        search_mm: f64 = touch.planned.search * 1e3,
-        centre_mm?: [f64; 3] = touch.centre.map(|centre| (centre * 1e3).coords.into()),
-        sigma_mm?: f64 = onset(touch).map(|onset| onset.sigma * 1e3),
-        deviation_mm?: f64 = touch.deviation.map(|deviation| deviation * 1e3),
-        speed_mm_per_s?: f64 = touch.record.as_ref().map(|record| record.speed * 1e3),
-        tip_radius_mm: f64 = ball_radius * 1e3,
-        largest_force_n?: f64 = touch.record.as_ref().map(|record| record.peak_force),
+        pub verdict: String = verdict(touch).to_owned(),
+        /// whether the feature is measured by it
+        pub accepted: bool = touch.refused.is_none(),
+        /// why not
+        pub reason?: String = touch.refused.clone(),
+        /// centre of the ball where the search begins
+        pub from_mm: [f64; 3] = (touch.planned.from * 1e3).coords.into(),
+        /// direction of the search, unit vector
+        pub approach: [f64; 3] = touch.planned.direction.into_inner().into(),
+        /// longest search
+        pub search_mm: f64 = touch.planned.search * 1e3,
+        /// of the ball at contact
+        pub centre_mm?: [f64; 3] = touch.centre.map(|centre| (centre * 1e3).coords.into()),
+        /// its standard uncertainty along the approach
+        pub sigma_mm?: f64 = onset(touch).map(|onset| onset.sigma * 1e3),
+        /// of the contact from the mesh before the touch, positive outside
+        pub deviation_mm?: f64 = touch.deviation.map(|deviation| deviation * 1e3),
+        /// of the measuring search
+        pub speed_mm_per_s?: f64 = touch.record.as_ref().map(|record| record.speed * 1e3),
+        /// of the ball
+        pub tip_radius_mm: f64 = ball_radius * 1e3,
+        /// of the whole touch
+        pub largest_force_n?: f64 = touch.record.as_ref().map(|record| record.peak_force),
         /// seconds, travel in mm, force against the approach and across it in N; going in and coming out
-        curve: Vec<[f64; 4]> = touch.record.iter().flat_map(|record| &record.curve).map(moment).collect(),
+        pub curve: Vec<[f64; 4]> = touch.record.iter().flat_map(|record| &record.curve).map(moment).collect(),
+    }
+}
+
+impl fmt::Display for TouchLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { index, verdict, centre_mm, sigma_mm, reason, .. } = self;
+        write!(f, "touch {index}: {verdict}")?;
+        if let (Some([x, y, z]), Some(sigma)) = (centre_mm, sigma_mm) {
+            write!(f, ", centre at ({x:.3} {y:.3} {z:.3}) ± {sigma:.3} mm")?;
+        }
+        reason.iter().try_for_each(|reason| write!(f, ", does not count: {reason}"))
     }
 }
 
@@ -50,14 +83,91 @@ fn verdict(touch: &ProbedTouch) -> &'static str {
     }
 }
 
-/// Writes all touches of some features.
-///
-/// - `ball_radius`: of the tip, m.
+/// The file of an arm that probes: each touch is appended as it is made.
+#[derive(Debug)]
+pub struct TouchLog {
+    path: PathBuf,
+    file: File,
+    /// m
+    ball_radius: f64,
+    /// touches of each feature so far
+    counts: BTreeMap<u32, usize>,
+}
+
+impl TouchLog {
+    /// Begins a file, in place of an older one.
+    ///
+    /// - `ball_radius`: of the tip, m.
+    ///
+    /// # Errors
+    /// Of the file.
+    pub fn create(path: &Path, ball_radius: f64) -> io::Result<Self> {
+        Ok(Self { path: path.to_owned(), file: File::create(path)?, ball_radius, counts: BTreeMap::new() })
+    }
+
+    /// Goes on behind the touches of a file, which are counted on; what a crash left of a line is removed.
+    ///
+    /// - `ball_radius`: of the tip, m.
+    ///
+    /// # Errors
+    /// Of the file, also where a whole line of it is no touch.
+    pub fn resume(path: &Path, ball_radius: f64) -> io::Result<Self> {
+        let text = std::fs::read(path)?;
+        let whole = whole_lines(&text);
+        let mut counts = BTreeMap::new();
+        for touch in touches_of(whole)? {
+            *counts.entry(touch.flag).or_default() += 1;
+        }
+        let file = OpenOptions::new().append(true).open(path)?;
+        file.set_len(whole.len() as u64)?;
+        Ok(Self { path: path.to_owned(), file, ball_radius, counts })
+    }
+
+    /// Appends a touch, which is on the disk when this returns.
+    ///
+    /// - `offset_ns`: from the arm's clock to that of the recording, ns.
+    ///
+    /// # Errors
+    /// Of the file.
+    pub fn append(&mut self, flag: u32, touch: &ProbedTouch, offset_ns: i64) -> io::Result<()> {
+        let count = self.counts.entry(flag).or_default();
+        let mut line = Vec::new();
+        write_line(&TouchLine::of(flag, *count, touch, self.ball_radius, offset_ns), &mut line)?;
+        *count += 1;
+        self.file.write_all(&line)?;
+        self.file.sync_data()
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many touches it holds.
+    pub fn count(&self) -> usize {
+        self.counts.values().sum()
+    }
+}
+
+/// All touches of a file, in their order; none where there is no file.
 ///
 /// # Errors
-/// Of the file.
-pub fn write_probed_touches(probed: &[Probed], ball_radius: f64, path: &Path) -> io::Result<()> {
-    write_atomically(path, |out| probed.iter().try_for_each(|one| write_lines(one, ball_radius, 0, out)))
+/// Of the file, also where a whole line of it is no touch.
+pub fn read_probed_touches(path: &Path) -> io::Result<Vec<TouchLine>> {
+    match std::fs::read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        text => touches_of(whole_lines(&text?)),
+    }
+}
+
+fn touches_of(lines: &[u8]) -> io::Result<Vec<TouchLine>> {
+    serde_json::Deserializer::from_slice(lines).into_iter().map(|line| Ok(line?)).collect()
+}
+
+/// Without what a crash left of the last line.
+fn whole_lines(text: &[u8]) -> &[u8] {
+    let end = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    &text[..end]
 }
 
 /// Writes the touches of one more feature behind those that are there.
@@ -68,14 +178,55 @@ pub fn write_probed_touches(probed: &[Probed], ball_radius: f64, path: &Path) ->
 /// Of the file.
 pub fn append_probed_touches(probed: &Probed, ball_radius: f64, offset_ns: i64, path: &Path) -> io::Result<()> {
     let mut lines = Vec::new();
-    write_lines(probed, ball_radius, offset_ns, &mut lines)?;
+    for (index, touch) in probed.touches.iter().enumerate() {
+        write_line(&TouchLine::of(probed.flag, index, touch, ball_radius, offset_ns), &mut lines)?;
+    }
     OpenOptions::new().create(true).append(true).open(path)?.write_all(&lines)
 }
 
-fn write_lines(probed: &Probed, ball_radius: f64, offset_ns: i64, out: &mut dyn Write) -> io::Result<()> {
-    for (index, touch) in probed.touches.iter().enumerate() {
-        serde_json::to_writer(&mut *out, &TouchLine::of(probed.flag, index, touch, ball_radius, offset_ns))?;
-        writeln!(out)?;
+fn write_line(touch: &TouchLine, out: &mut dyn Write) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, touch)?;
+    writeln!(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector3};
+    use touchup_core::probing::plan::TouchPlan;
+
+    use super::*;
+
+    fn refused(reason: &str) -> ProbedTouch {
+        let (entry, from) = (Point3::origin(), Point3::new(1e-3, 2e-3, 3e-3));
+        let planned = TouchPlan { entry, from, direction: Vector3::z_axis(), search: 4e-3, expected: None };
+        ProbedTouch { planned, record: None, centre: None, deviation: None, refused: Some(reason.to_owned()) }
     }
-    Ok(())
+
+    fn read(path: &Path) -> Vec<(u32, usize, Option<String>)> {
+        let touches = read_probed_touches(path).unwrap();
+        touches.into_iter().map(|touch| (touch.flag, touch.index, touch.reason)).collect()
+    }
+
+    #[test]
+    fn a_crash_in_mid_line_loses_that_line_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("touches.jsonl");
+        let mut log = TouchLog::create(&path, 1.5e-3).unwrap();
+        log.append(1, &refused("a"), 0).unwrap();
+        log.append(2, &refused("b"), 0).unwrap();
+        drop(log);
+        let whole = std::fs::read(&path).unwrap();
+        let line = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        let [first, second] = ["a", "b"].map(|reason| Some(reason.to_owned()));
+        for cut in line..whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            assert_eq!(read(&path), [(1, 0, first.clone())], "cut at {cut}");
+        }
+        let mut log = TouchLog::resume(&path, 1.5e-3).unwrap();
+        assert_eq!(log.count(), 1);
+        log.append(2, &refused("b"), 0).unwrap();
+        log.append(1, &refused("b"), 0).unwrap();
+        assert_eq!(read(&path), [(1, 0, first), (2, 0, second.clone()), (1, 1, second)]);
+        assert_eq!(std::fs::read(&path).unwrap()[..whole.len()], whole);
+    }
 }

@@ -87,7 +87,7 @@ fn payload_of_arm(arguments: &PayloadArguments, robot: RobotName, gravity: f64) 
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
     let stage = "identify the payload";
-    let (readings, _) = cell.measure(robot, scene, stage, truth, |prober| prober.measure_payload())?;
+    let (readings, _) = cell.measure(robot, scene, stage, None, truth, |prober| prober.measure_payload())?;
     let PayloadReadings { segments, not_reached } = readings;
     let params = PayloadParams { gravity, ..PayloadParams::default() };
     let fit = fit_payload(&segments, &params).map_err(|error| CliError::arm(advice(&error)))?;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use clap::Args;
 
-use super::super::arm::ArmArguments;
+use super::super::arm::{ArmArguments, TouchesOutput};
 use super::super::check::repeated;
 use super::super::{CliError, Losses, reported};
 use super::{Calibrated, CalibrationTarget, rounded};
@@ -22,14 +22,16 @@ pub(in crate::cli) struct StiffnessArguments {
     #[arg(long, value_name = "N", default_value_t = 10)]
     touches: usize,
     #[command(flatten)]
+    output: TouchesOutput,
+    #[command(flatten)]
     target: CalibrationTarget,
 }
 
 /// The verb.
 pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
-    let StiffnessArguments { arm, spot, touches, target } = arguments;
+    let StiffnessArguments { arm, spot, touches, output, target } = arguments;
     let (scene, draft) = target.open_for_arm()?;
-    target.write(&draft, &StiffnessFound::of(&repeated(arm, scene, spot, *touches)?))?;
+    target.write(&draft, &StiffnessFound::of(&repeated(arm, scene, spot, *touches, output)?))?;
     Ok(Losses::new())
 }
 

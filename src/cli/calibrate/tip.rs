@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::{Point3, Vector3};
 
-use super::super::arm::{CellArguments, RobotName};
+use super::super::arm::{CellArguments, RobotName, TouchesOutput};
 use super::super::probing::millimetres;
 use super::super::{CliError, Losses, reported};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
@@ -33,6 +33,8 @@ pub(in crate::cli) struct TipArguments {
     /// True position of the ball of a simulated arm in the flange, mm; default: robot.tip_position_mm of the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     truth_tip_mm: Option<String>,
+    #[command(flatten)]
+    output: TouchesOutput,
     #[command(flatten)]
     source: CalibrationRecording,
     #[command(flatten)]
@@ -86,7 +88,8 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
 
 /// - `spot`: as it was written, X,Y,Z in mm.
 fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
-    let TipArguments { cell, truth_tip_mm, target, .. } = arguments;
+    let TipArguments { cell, truth_tip_mm, output, target, .. } = arguments;
+    let out = output.touches_out.as_deref();
     let place = Point3::from(millimetres("--spot", spot)?);
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, _: &Scene| {
@@ -94,7 +97,7 @@ fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
-    let (measured, of_arm) = cell.measure(robot, scene, "touch", truth, |prober| prober.measure_tip(&place))?;
+    let (measured, of_arm) = cell.measure(robot, scene, "touch", out, truth, |prober| prober.measure_tip(&place))?;
     let TipPoses { poses_bf, normal_b, not_reached } = measured;
     let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
     target.write(&draft, &PivotFound::of(&fit, &of_arm, &not_reached))?;

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use crate::cli::pictures::write_picture;
 use crate::cli::{CliError, counted};
 use crate::compare::{DrawnMesh, PicturePanel, PictureParams, Rgb};
+use crate::io::probed_touches_file::TouchLine;
 use crate::mesh::TriMesh;
 use crate::probing::execute::{Flag, Plan, PlannedMotion, Probed};
 
@@ -79,23 +80,31 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
 }
 
 /// The refined mesh with the touches.
-pub(super) fn draw_touches(mesh: &TriMesh, probed: &[Probed], flags: &[Flag], path: &Path) -> Result<(), CliError> {
+///
+/// - `probed`: their slides.
+pub(super) fn draw_touches(
+    mesh: &TriMesh,
+    touches: &[TouchLine],
+    probed: &[Probed],
+    flags: &[Flag],
+    path: &Path,
+) -> Result<(), CliError> {
     let size = diagonal(mesh);
     let mut drawing = DrawnMesh::of(mesh, PART);
     let (mut touched, mut missed, mut refused) = (0, 0, 0);
-    for touch in probed.iter().flat_map(|one| &one.touches) {
-        let along = touch.planned.direction.into_inner();
-        let (end, colour) = match (&touch.centre, &touch.refused) {
-            (Some(centre), None) => (*centre, TOUCHED),
-            (_, Some(_)) => (touch.planned.from, REFUSED),
-            (None, None) => (touch.planned.from + along * touch.planned.search, MISS),
+    for touch in touches {
+        let from = Point3::from(touch.from_mm) / 1e3;
+        let (end, colour) = match (touch.centre_mm, touch.accepted) {
+            (Some(centre_mm), true) => (Point3::from(centre_mm) / 1e3, TOUCHED),
+            (_, false) => (from, REFUSED),
+            (None, true) => (from + Vector3::from(touch.approach) * (touch.search_mm / 1e3), MISS),
         };
         match colour {
             TOUCHED => touched += 1,
             MISS => missed += 1,
             _ => refused += 1,
         }
-        drawing.line(&touch.planned.from, &end, LINE * size, colour);
+        drawing.line(&from, &end, LINE * size, colour);
         drawing.place(&end, 0.5 * PLACE * size, colour);
     }
     for probed in probed.iter().flat_map(|one| &one.slides) {

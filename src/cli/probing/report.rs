@@ -2,30 +2,33 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::cli::refine::RefineSummary;
 use crate::cli::{counted, reported};
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::probing::arm::SlideRecord;
-use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide};
+use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch};
 
 reported! {
     /// One flag: of `probed.json`.
-    #[derive(Clone)]
-    pub(in crate::cli) struct ProbedRecord, fn of(probed: &Probed, flagged: Option<&Flag>) {
-        flag: u32 = probed.flag,
-        kind: &'static str = flagged.and_then(|flag| flag.kind).map_or("unknown", Kind::name),
-        flagged_mm: [f64; 3] = flagged.map_or([f64::NAN; 3], |flag| (flag.place * 1e3).coords.into()),
-        search_radius_mm: f64 = flagged.map_or(f64::NAN, |flag| flag.radius * 1e3),
+    #[derive(Clone, Deserialize)]
+    pub(in crate::cli) struct ProbedRecord, pub(super) fn of(probed: &Probed, flagged: &Flag) {
+        pub(super) flag: u32 = probed.flag,
+        kind: String = kind_of(flagged).to_owned(),
+        flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
+        search_radius_mm: f64 = flagged.radius * 1e3,
         /// how it ended: `tolerance_reached`, `touches_spent`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
         /// `no_clear_path`, `stopped`
-        code: &'static str = code(&probed.ending),
+        code: String = code(&probed.ending).to_owned(),
         /// the same in words
         ending: String = probed.ending.to_string(),
         touches: usize = probed.touches.len(),
-        #[serde(skip_serializing_if = "Vec::is_empty")]
+        /// the touches that do not count, and why
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        rejected_touches: Vec<RejectedTouch> = probed.touches.iter().enumerate().filter_map(RejectedTouch::of).collect(),
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
         slides: Vec<SlideRecordOfFile> = probed.slides.iter().map(SlideRecordOfFile::of).collect(),
         duration_s: f64 = probed.seconds,
         largest_force_n: f64 = probed.peak_force,
@@ -35,9 +38,53 @@ reported! {
     }
 }
 
+/// A touch that does not count.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct RejectedTouch {
+    /// of this probing of the feature, from 0 on
+    index: usize,
+    reason: String,
+}
+
+impl RejectedTouch {
+    fn of((index, touch): (usize, &ProbedTouch)) -> Option<Self> {
+        Some(Self { index, reason: touch.refused.clone()? })
+    }
+}
+
+/// Code of an unknown region, which has no number: all its touches are made.
+const UNKNOWN: &str = "unknown";
+
+/// What a flag is for, by its name.
+pub(super) fn kind_of(flag: &Flag) -> &'static str {
+    flag.kind.map_or(UNKNOWN, Kind::name)
+}
+
+impl ProbedRecord {
+    /// Whether the arm probed it to an end, found or not.
+    pub(super) fn is_finished(&self) -> bool {
+        matches!(self.code.as_str(), "tolerance_reached" | "touches_spent" | "time_spent" | "nothing_found")
+    }
+
+    /// Whether a stop of the arm, or a signal, ended it.
+    pub(super) fn is_broken_off(&self) -> bool {
+        matches!(self.code.as_str(), "cancelled" | "stopped")
+    }
+
+    /// Why it is not as it was asked for, where that is so.
+    pub(super) fn loss(&self) -> Option<String> {
+        let is_as_asked = match self.code.as_str() {
+            "tolerance_reached" => true,
+            "touches_spent" => self.kind == UNKNOWN,
+            _ => false,
+        };
+        (!is_as_asked).then(|| format!("feature {}: {}", self.flag, self.ending))
+    }
+}
+
 reported! {
     /// One slide.
-    #[derive(Clone)]
+    #[derive(Clone, Deserialize)]
     struct SlideRecordOfFile, fn of(probed: &ProbedSlide) {
         /// its outcome, or why it was not made
         ending: String = match &probed.record {
@@ -51,7 +98,7 @@ reported! {
 
 reported! {
     /// The contact force along it.
-    #[derive(Clone)]
+    #[derive(Clone, Deserialize)]
     struct SlideForces, fn of(record: &SlideRecord) {
         duration_s: f64 = (record.stamps_ns[1] - record.stamps_ns[0]) as f64 * 1e-9,
         mean_force_n: f64 = record.mean_force,
@@ -65,7 +112,9 @@ reported! {
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
     pub features: Vec<ProbedRecord>,
-    pub refine: RefineSummary,
+    /// of the mesh; not there where a signal ended the probing
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refine: Option<RefineSummary>,
 }
 
 fn code(ending: &Ending) -> &'static str {
@@ -81,12 +130,6 @@ fn code(ending: &Ending) -> &'static str {
     }
 }
 
-/// All flags that were begun.
-pub(in crate::cli) fn records(probed: &[Probed], flags: &[Flag]) -> Vec<ProbedRecord> {
-    let record = |one: &Probed| ProbedRecord::of(one, flags.iter().find(|flag| flag.id == one.flag));
-    probed.iter().map(record).collect()
-}
-
 impl fmt::Display for ProbingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let reached = self.features.iter().filter(|record| record.code == code(&Ending::ToleranceReached)).count();
@@ -97,10 +140,17 @@ impl fmt::Display for ProbingSummary {
             record.feature.iter().try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
             let touches = counted(*touches, "touch", "touches");
             write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
+            record.rejected_touches.iter().try_for_each(|touch| write!(f, "\n  {touch}"))?;
             record.slides.iter().try_for_each(|slide| write!(f, "\n  {slide}"))?;
             writeln!(f)?;
         }
-        write!(f, "{}", self.refine)
+        self.refine.iter().try_for_each(|refine| write!(f, "{refine}"))
+    }
+}
+
+impl fmt::Display for RejectedTouch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "touch {} does not count: {}", self.index, self.reason)
     }
 }
 

@@ -1,17 +1,21 @@
-//! The mesh that follows while an arm probes.
+//! What is around an arm while it works: the mesh, which follows a probing, the files that are written, and the signals that stop it.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
-use crate::cli::CliError;
+use super::files::ProbeFiles;
+use super::ready::Ready;
 use crate::cli::progress::WorkProgress as Bar;
+use crate::cli::signals::StopSignals;
+use crate::cli::{CliError, not_written, print_result};
+use crate::io::probed_touches_file::{TouchLine, TouchLog};
 use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer, StopRequest};
-use crate::probing::execute::{Cell, Progress, World};
-use crate::scene::Scene;
-use crate::stylus::{Message, Sample, StampedPose, StampedWrench, Wrench, WrenchFrame};
+use crate::probing::execute::{ProbedTouch, Progress, StaticWorld, World};
+use crate::stylus::{Message, Sample, StampedPose, WrenchFrame};
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 16;
@@ -19,70 +23,101 @@ const ROOM: usize = 1 << 16;
 /// The mesh is read before each touch alone, not in between: a renewal each 200 ms, ns.
 const EVERY_NS: i64 = 200_000_000;
 
-/// Takes each state of the arm for a sample, and keeps it.
-pub(super) struct LiveWorld<'a> {
+/// The mesh that follows the samples.
+struct FollowingMesh {
     engine: Engine,
-    cell: &'a Cell,
-    messages: Vec<Message>,
+    /// of the base in the frame of the scan
+    pose_ob: Isometry3<f64>,
+    pose: Option<StampedPose>,
     failed: Option<LiveError>,
+}
+
+impl FollowingMesh {
+    fn new(ready: &Ready, is_simulated: bool) -> Result<Self, CliError> {
+        let nothing = || CliError::usage("the scene names no `refine`, so nothing would move the mesh");
+        let params = ready.scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
+        // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
+        let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
+        let scan = Arc::new((ready.mesh.clone(), FaceTree::new(&ready.mesh)));
+        let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
+        let engine = Engine::new(ready.mesh.clone(), params, ready.scene.patcher_params(), renewal)?;
+        Ok(Self { engine, pose_ob: ready.cell.pose_bo.inverse(), pose: None, failed: None })
+    }
+
+    /// Takes a message; a wrench comes behind the pose of the same state.
+    fn take(&mut self, message: &Message) {
+        let wrench = match message {
+            Message::Pose(pose) => return self.pose = Some(*pose),
+            Message::Wrench(wrench) => wrench,
+        };
+        let Some(pose) = self.pose.filter(|pose| pose.stamp_ns == wrench.stamp_ns) else { return };
+        let sample = Sample { stamp_ns: wrench.stamp_ns, pose_ot: self.pose_ob * pose.pose_ot, wrench: wrench.wrench };
+        match self.engine.push(&sample) {
+            Ok(_) | Err(LiveError::Refine(_)) => {}
+            Err(error) => self.failed = Some(error),
+        }
+    }
+}
+
+/// Takes each state of the arm for a sample, and writes it.
+pub(super) struct LiveWorld<'a> {
+    mesh: FollowingMesh,
+    files: ProbeFiles,
+    signals: &'a StopSignals,
+    failed: Option<CliError>,
     bar: Bar,
 }
 
 impl<'a> LiveWorld<'a> {
+    /// - `is_resumed`: goes on with the files of the folder, and with the mesh that was touched.
     pub fn new(
-        scan: Arc<(TriMesh, FaceTree)>,
-        scene: &Scene,
-        cell: &'a Cell,
-        is_simulated: bool,
+        ready: &Ready,
+        out: &Path,
+        [is_simulated, is_resumed]: [bool; 2],
+        signals: &'a StopSignals,
     ) -> Result<Self, CliError> {
-        let nothing = || CliError::usage("the scene names no `refine`, so nothing would move the mesh");
-        let params = scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
-        // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
-        let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
-        let mesh = scan.0.clone();
-        let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
-        let engine = Engine::new(mesh, params, scene.patcher_params(), renewal)?;
-        Ok(Self { engine, cell, messages: Vec::new(), failed: None, bar: Bar::new("probe", None) })
+        let mut mesh = FollowingMesh::new(ready, is_simulated)?;
+        let ball_radius = ready.params.pattern.ball_radius;
+        let files = match is_resumed {
+            true => ProbeFiles::resume(out, ball_radius, &mut |message| mesh.take(message))?,
+            false => ProbeFiles::begin(out, ball_radius)?,
+        };
+        Ok(Self { mesh, files, signals, failed: None, bar: Bar::new("probe", None) })
     }
 
-    /// All samples.
-    pub fn finish(self) -> Result<Vec<Message>, CliError> {
-        self.failed.map_or(Ok(self.messages), |error| Err(error.into()))
+    /// Ends the recording; returns how many touches were written.
+    pub fn finish(self) -> Result<usize, CliError> {
+        let written = self.files.finish();
+        match (self.failed, self.mesh.failed) {
+            (Some(error), _) => Err(error),
+            (None, Some(error)) => Err(error.into()),
+            (None, None) => written,
+        }
     }
 }
 
 impl Observer for LiveWorld<'_> {
     fn on_state(&mut self, state: &ArmState) {
         self.bar.step();
-        let turned = |v| state.pose_bt.rotation.inverse() * v;
-        // in the axes of the probe, as its sensor would have it
-        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
-        let (stamp_ns, pose_ot) = (state.stamp_ns, self.cell.pose_bo.inverse() * state.pose_bt);
-        if self.messages.last().is_some_and(|last| last.stamp_ns() >= stamp_ns) {
-            return;
-        }
-        // recorded where the arm has it: the scene says where the part is
-        self.messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot: state.pose_bt }));
-        self.messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
-        let sample = Sample { stamp_ns, pose_ot, wrench };
-        match self.engine.push(&sample) {
-            Ok(_) | Err(LiveError::Refine(_)) => {}
+        match self.files.record(state) {
+            Ok(messages) => messages.iter().flatten().for_each(|message| self.mesh.take(message)),
             Err(error) => self.failed = Some(error),
         }
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        self.failed.as_ref().map(|_| StopRequest::Retract)
+        let has_failed = self.failed.is_some() || self.mesh.failed.is_some();
+        self.signals.request().max(has_failed.then_some(StopRequest::Retract))
     }
 }
 
 impl World for LiveWorld<'_> {
     fn mesh(&self) -> &TriMesh {
-        self.engine.refiner().mesh()
+        self.mesh.engine.refiner().mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.engine.refiner().closest_face(place, reach)
+        self.mesh.engine.refiner().closest_face(place, reach)
     }
 
     fn publish(&mut self, progress: &Progress) {
@@ -94,5 +129,77 @@ impl World for LiveWorld<'_> {
             uncertainty_um,
             "touching"
         );
+    }
+
+    fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
+        if let Err(error) = self.files.touched(flag, touch) {
+            self.failed = Some(error);
+        }
+    }
+}
+
+/// The scan as it is, while an arm measures something on it.
+pub(in crate::cli) struct SpotWorld<'a> {
+    scan: StaticWorld,
+    signals: &'a StopSignals,
+    touches: Option<TouchLog>,
+    /// in words, curves left out
+    made: Vec<String>,
+    /// m
+    ball_radius: f64,
+    failed: Option<CliError>,
+}
+
+impl<'a> SpotWorld<'a> {
+    /// - `touches`: where each touch is written as it is made.
+    pub fn new(ready: &Ready, touches: Option<&Path>, signals: &'a StopSignals) -> Result<Self, CliError> {
+        let ball_radius = ready.params.pattern.ball_radius;
+        let create = |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
+        let touches = touches.map(create).transpose()?;
+        Ok(Self { scan: ready.static_world(), signals, touches, made: Vec::new(), ball_radius, failed: None })
+    }
+
+    /// What was measured; where that was broken off the touches until then are printed, unless a file has them.
+    pub fn finish<T>(self, measured: Result<T, CliError>) -> Result<T, CliError> {
+        let measured = self.failed.map_or(measured, Err);
+        measured.map_err(|error| match (self.made.len(), self.touches) {
+            (0, _) => error,
+            (count, Some(touches)) => {
+                error.with(format_args!("the touches ({count}) are in {}", touches.path().display()))
+            }
+            (count, None) => {
+                print_result(&self.made.join("\n"));
+                error.with(format_args!("the touches ({count}) are printed; --touches-out keeps all of them"))
+            }
+        })
+    }
+}
+
+impl Observer for SpotWorld<'_> {
+    fn on_state(&mut self, _: &ArmState) {}
+
+    fn stop_request(&self) -> Option<StopRequest> {
+        self.signals.request().max(self.failed.as_ref().map(|_| StopRequest::Retract))
+    }
+}
+
+impl World for SpotWorld<'_> {
+    fn mesh(&self) -> &TriMesh {
+        self.scan.mesh()
+    }
+
+    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+        self.scan.closest_face(place, reach)
+    }
+
+    fn publish(&mut self, _: &Progress) {}
+
+    fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
+        self.made.push(TouchLine::of(flag, self.made.len(), touch, self.ball_radius, 0).to_string());
+        let Some(touches) = &mut self.touches else { return };
+        // no recording has another clock
+        if let Err(error) = touches.append(flag, touch, 0) {
+            self.failed = Some(not_written(touches.path())(error));
+        }
     }
 }

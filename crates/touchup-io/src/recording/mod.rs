@@ -14,6 +14,7 @@ mod framing;
 mod mcap;
 mod point_cloud;
 mod reader;
+mod resume;
 mod segments;
 mod writer;
 

@@ -9,6 +9,9 @@ use super::{RecordingError, RecordingWriter, TopicKind, Topics};
 use crate::atomic::write_atomically;
 use touchup_core::stylus::Message;
 
+/// Names the files of a recording that was ended.
+pub(super) const METADATA: &str = "metadata.yaml";
+
 /// Messages of one file: a quarter of an hour of a stylus, 60 MB.
 const MOST_IN_A_SEGMENT: u64 = 1_000_000;
 
@@ -19,7 +22,7 @@ pub struct SegmentedWriter {
     folder: PathBuf,
     topics: Topics,
     current: Option<RecordingWriter<BufWriter<File>>>,
-    segments: Vec<FileSegment>,
+    pub(super) segments: Vec<FileSegment>,
     /// messages that [`Self::flush`] has not handed over yet
     unflushed: u64,
     /// length of the file after the last flush, bytes
@@ -28,14 +31,33 @@ pub struct SegmentedWriter {
 
 /// Entry of one file in `metadata.yaml`.
 #[derive(Clone, Debug)]
-struct FileSegment {
+pub(super) struct FileSegment {
     name: String,
     /// poses and wrenches
     counts: [u64; 2],
     first_ns: i64,
     last_ns: i64,
     /// it has its index, and a proper end
-    is_whole: bool,
+    pub is_whole: bool,
+}
+
+impl FileSegment {
+    /// The name of the file with a number, from 0 on.
+    pub fn name_of(number: usize) -> String {
+        format!("touch_{number:04}.mcap")
+    }
+
+    /// - `stamp_ns`: of the first message.
+    pub fn begin(number: usize, stamp_ns: i64) -> Self {
+        let (first_ns, last_ns) = (stamp_ns, stamp_ns);
+        Self { name: Self::name_of(number), counts: [0; 2], first_ns, last_ns, is_whole: false }
+    }
+
+    pub fn count(&mut self, message: &Message) {
+        self.counts[usize::from(matches!(message, Message::Wrench(_)))] += 1;
+        self.first_ns = self.first_ns.min(message.stamp_ns());
+        self.last_ns = self.last_ns.max(message.stamp_ns());
+    }
 }
 
 impl SegmentedWriter {
@@ -59,20 +81,17 @@ impl SegmentedWriter {
         let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
         writer.write(*message, frame)?;
         self.unflushed += 1;
-        segment.counts[usize::from(matches!(message, Message::Wrench(_)))] += 1;
-        segment.first_ns = segment.first_ns.min(message.stamp_ns());
-        segment.last_ns = segment.last_ns.max(message.stamp_ns());
+        segment.count(message);
         Ok(())
     }
 
     fn begin_segment(&mut self, stamp_ns: i64) -> Result<(), RecordingError> {
         self.end_segment()?;
-        let name = format!("touch_{:04}.mcap", self.segments.len());
-        let path = self.folder.join(&name);
+        let segment = FileSegment::begin(self.segments.len(), stamp_ns);
+        let path = self.folder.join(&segment.name);
         let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
         self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics)?);
-        let (first_ns, last_ns) = (stamp_ns, stamp_ns);
-        self.segments.push(FileSegment { name, counts: [0; 2], first_ns, last_ns, is_whole: false });
+        self.segments.push(segment);
         Ok(())
     }
 
@@ -102,6 +121,20 @@ impl SegmentedWriter {
         Ok(std::mem::take(&mut self.unflushed))
     }
 
+    /// Brings to the disk all that was written, whatever becomes of the machine.
+    ///
+    /// # Errors
+    /// As [`Self::flush`].
+    pub fn sync(&mut self) -> Result<(), RecordingError> {
+        if self.flush()? == 0 {
+            return Ok(());
+        }
+        let Some(segment) = self.segments.last() else { return Ok(()) };
+        let path = self.folder.join(&segment.name);
+        let synced = File::options().append(true).open(&path).and_then(|file| file.sync_data());
+        synced.map_err(|source| RecordingError::Io { path, source })
+    }
+
     /// After an error: leaves of the file what was flushed, and nothing of one that was not. What is written next begins
     /// another. Returns how many messages are lost.
     pub fn give_up_segment(&mut self) -> u64 {
@@ -120,7 +153,7 @@ impl SegmentedWriter {
         std::mem::take(&mut self.unflushed)
     }
 
-    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording of which a file has no
+    /// Ends the last file and writes [`METADATA`]; nothing when nothing was written. A recording of which a file has no
     /// proper end gets none: touchup reads it by its files, as after a crash.
     ///
     /// # Errors
@@ -130,7 +163,7 @@ impl SegmentedWriter {
         if self.segments.is_empty() || !self.segments.iter().all(|segment| segment.is_whole) {
             return Ok(());
         }
-        let (path, text) = (self.folder.join("metadata.yaml"), self.metadata());
+        let (path, text) = (self.folder.join(METADATA), self.metadata());
         write_atomically(&path, |out| out.write_all(text.as_bytes()))
             .map_err(|source| RecordingError::Io { path, source })
     }

@@ -14,6 +14,7 @@ use touchup::stylus::{Message, StampedPose, StampedWrench};
 mod damage;
 mod made;
 mod markers;
+mod resumed;
 
 use crate::shared::shared;
 use made::{START_NS, db3_of, mcap_bytes, pose, put, read, touch, wrench};

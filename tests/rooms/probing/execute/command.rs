@@ -21,7 +21,7 @@ fn stderr(done: &Output) -> String {
 }
 
 /// Scene, scan and part of the demo in a folder.
-fn cell(folder: &Path, change: impl Fn(String) -> String) -> [String; 2] {
+pub fn cell(folder: &Path, change: impl Fn(String) -> String) -> [String; 2] {
     let plate = Plate::default();
     write_mesh(&folder.join("scan.ply"), &plate_scan(1), MeshUnit::Millimetre).unwrap();
     write_mesh(&folder.join("truth.ply"), &plate.mesh(1e-5).unwrap(), MeshUnit::Millimetre).unwrap();
@@ -66,7 +66,7 @@ fn the_arm_of_the_demo_finds_every_feature() {
 
 /// All files are there, and the recording is refined to the same mesh by another run.
 fn is_written(folder: &Path) {
-    for file in ["plan.png", "touches.png", "deviation.png", "refined.ply", "touch.mcap", "probed.json", "scene.yaml"] {
+    for file in ["plan.png", "touches.png", "deviation.png", "refined.ply", "recording", "probed.json", "scene.yaml"] {
         assert!(folder.join(file).exists(), "{file}");
     }
     let touches = fs::read_to_string(folder.join("probed_touches.jsonl")).unwrap();
@@ -82,7 +82,7 @@ fn is_written(folder: &Path) {
         "--scan",
         &path("scan.ply"),
         "--bag",
-        &path("touch.mcap"),
+        &path("recording"),
         "--wrench-topic",
         "/probe/wrench",
         "--pose-topic",
@@ -157,7 +157,56 @@ fn a_dry_run_draws_the_plan_and_moves_nothing() {
     let planned = format!("feature 1: {} touches planned", feature["touches"]);
     assert!(feature["touches"].as_u64().unwrap() > 0 && text.contains(&planned), "{plan} {text}");
     assert!(folder.path().join("out/plan.png").exists());
-    assert!(!folder.path().join("out/touch.mcap").exists());
+    assert!(!folder.path().join("out/recording").exists());
+}
+
+/// No controller, and no part: neither is asked for.
+#[test]
+fn a_dry_run_connects_to_no_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, _] = cell(folder.path(), |scene| scene);
+    let out = folder.path().join("out");
+    let plan = |robot: &str, more: &[&str]| {
+        let arguments = ["probe", "--robot", robot, "--scene", &scene, "--out", out.to_str().unwrap(), "--dry-run"];
+        touchup(&[&arguments[..], &["--feature", "hole@16,36,12", "--json"], more].concat())
+    };
+    let json = |done: &Output| -> Value {
+        serde_json::from_slice(&done.stdout).unwrap_or_else(|_| panic!("{}", stderr(done)))
+    };
+    let [ur, sim] = ["ur", "sim"].map(|robot| plan(robot, &[]));
+    assert_eq!(ur.status.code(), Some(0), "{}", stderr(&ur));
+    assert_eq!(json(&ur), json(&sim));
+    let lower = json(&plan("ur", &["--from-mm", "16,36,30"]));
+    assert_eq!(lower["from_mm"], serde_json::json!([16.0, 36.0, 30.0]));
+    assert_eq!(lower["features"][0]["touches"], json(&ur)["features"][0]["touches"]);
+    let far = plan("ur", &["--from-mm", "0,0,3000"]);
+    assert_eq!(far.status.code(), Some(2));
+    assert!(
+        stderr(&far).contains("the arm does not reach (0.0 0.0 3000.0) mm, where the plan begins"),
+        "{}",
+        stderr(&far)
+    );
+}
+
+/// A tolerance below what a touch can be known by, and too few touches for a hole.
+#[test]
+fn what_is_not_as_asked_is_named_with_its_reason_and_exit_code() {
+    for (more, code, why) in [
+        (
+            ["--max-touches", "15", "--tolerance-mm", "1e-5"],
+            "touches_spent",
+            "tolerance not reached: the touches are spent",
+        ),
+        (["--max-touches", "5", "--tolerance-mm", "0.1"], "nothing_found", "nothing found: 5 touches are not enough"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let done =
+            probe(folder.path(), |scene| scene, &[&["--feature", "hole@17,35,12", "--json"], &more[..]].concat());
+        assert_eq!(done.status.code(), Some(4), "{}", stderr(&done));
+        let told: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(told["features"][0]["code"], code);
+        assert!(stderr(&done).contains(&format!("feature 1: {why}")), "{}", stderr(&done));
+    }
 }
 
 /// The request, the change of the scene, and a part of the refusal.

@@ -1,4 +1,5 @@
 mod command;
+mod interrupted;
 mod planning;
 mod sliding;
 

@@ -1,0 +1,107 @@
+//! A recording that is begun in the place of another one, or goes on behind it, also after a crash.
+
+use std::fs::{create_dir_all, remove_file};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use super::segments::{FileSegment, METADATA};
+use super::{RecordingError, RecordingReader, SegmentedWriter, Topics, write_recording};
+use touchup_core::stylus::Message;
+
+impl SegmentedWriter {
+    /// Begins a recording in a folder, which is made where it is not there, in place of an older one.
+    ///
+    /// # Errors
+    /// [`RecordingError::Io`].
+    pub fn replace(folder: &Path, topics: &Topics) -> Result<Self, RecordingError> {
+        let io = |source| RecordingError::Io { path: folder.to_owned(), source };
+        create_dir_all(folder).map_err(io)?;
+        remove(&folder.join(METADATA)).map_err(io)?;
+        for path in segment_paths(folder) {
+            remove(&path).map_err(io)?;
+        }
+        Ok(Self::new(folder, topics))
+    }
+
+    /// Goes on behind the recording in a folder.
+    ///
+    /// A segment that a crash left without its end is written anew as far as it can be read; where nothing of the last one
+    /// can be read it is removed.
+    ///
+    /// - `frames`: of the poses, and of the wrenches.
+    /// - `each`: receives the messages that are there, in their order.
+    ///
+    /// # Errors
+    /// [`RecordingError`]
+    pub fn resume(
+        folder: &Path,
+        topics: &Topics,
+        frames: [&str; 2],
+        each: &mut dyn FnMut(&Message),
+    ) -> Result<Self, RecordingError> {
+        let io = |source| RecordingError::Io { path: folder.to_owned(), source };
+        create_dir_all(folder).map_err(io)?;
+        remove(&folder.join(METADATA)).map_err(io)?;
+        let mut writer = Self::new(folder, topics);
+        let paths = segment_paths(folder);
+        for path in &paths {
+            let (messages, is_whole) = read_segment(path, topics)?;
+            let Some(first) = messages.first() else {
+                if writer.segments.len() + 1 < paths.len() {
+                    let reason =
+                        "nothing of it can be read, and other segments follow: go on in another folder".to_owned();
+                    return Err(RecordingError::NotARecording { path: path.clone(), reason });
+                }
+                remove(path).map_err(io)?;
+                break;
+            };
+            let mut segment = FileSegment::begin(writer.segments.len(), first.stamp_ns());
+            for message in &messages {
+                segment.count(message);
+                each(message);
+            }
+            if !is_whole {
+                write_recording(path, topics, frames[0], frames[1], messages)?;
+            }
+            segment.is_whole = true;
+            writer.segments.push(segment);
+        }
+        Ok(writer)
+    }
+}
+
+/// The files of the segments, whose numbers have no gap.
+fn segment_paths(folder: &Path) -> Vec<PathBuf> {
+    (0..).map(|number| folder.join(FileSegment::name_of(number))).take_while(|path| path.exists()).collect()
+}
+
+/// The messages of a segment up to where it is damaged, and whether it has its end.
+fn read_segment(path: &Path, topics: &Topics) -> Result<(Vec<Message>, bool), RecordingError> {
+    let mut reader = match RecordingReader::open(path, topics) {
+        Ok(reader) => reader,
+        // it ends before its first message
+        Err(
+            RecordingError::Damaged { .. } | RecordingError::MissingTopic { .. } | RecordingError::NotARecording { .. },
+        ) => {
+            return Ok((Vec::new(), false));
+        }
+        Err(error) => return Err(error),
+    };
+    let mut messages = Vec::new();
+    let mut is_whole = true;
+    for message in reader.by_ref() {
+        match message {
+            Ok(message) => messages.push(message),
+            Err(RecordingError::Damaged { .. }) => is_whole = false,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((messages, is_whole && !reader.truncated()))
+}
+
+fn remove(path: &Path) -> io::Result<()> {
+    match remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}

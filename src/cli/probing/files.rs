@@ -1,0 +1,109 @@
+//! The files that grow while an arm probes: the touches, and all that it measured.
+//!
+//! Of a touch that is written all samples are written, whatever ends the program.
+
+use std::path::Path;
+
+use crate::cli::{CliError, not_written};
+use crate::io::probed_touches_file::TouchLog;
+use crate::io::recording::{SegmentedWriter, Topics};
+use crate::probing::arm::ArmState;
+use crate::probing::execute::ProbedTouch;
+use crate::stylus::{Message, StampedPose, StampedWrench, Wrench};
+
+/// The touches, a line each.
+pub(super) const TOUCHES: &str = "probed_touches.jsonl";
+/// Folder of the poses and wrenches.
+pub(super) const RECORDING: &str = "recording";
+/// Frame of the poses in the recording: the base of the arm.
+const BASE_FRAME: &str = "base";
+/// Frame of the wrenches: the probe's own.
+const PROBE_FRAME: &str = "probe";
+/// Between two touches samples wait no longer than this before they are written, ns of the arm's clock.
+const FLUSH_EVERY_NS: i64 = 1_000_000_000;
+/// An arm whose clock began anew goes on so long after its last sample, ns.
+const PAUSE_NS: i64 = 1_000_000_000;
+
+/// Those of the recording.
+pub(super) fn probe_topics() -> Topics {
+    Topics { pose: "/probe/pose".to_owned(), wrench: "/probe/wrench".to_owned(), markers: None }
+}
+
+/// The open files.
+pub(super) struct ProbeFiles {
+    touches: TouchLog,
+    recording: SegmentedWriter,
+    /// from the arm's clock to that of the recording, ns; `None` before the first state
+    offset_ns: Option<i64>,
+    /// stamp of the last sample, ns
+    last_ns: Option<i64>,
+    /// the samples up to this stamp are with the system, ns
+    flushed_ns: i64,
+}
+
+impl ProbeFiles {
+    /// Begins the files of a folder, in place of older ones.
+    ///
+    /// - `ball_radius`: m.
+    pub fn begin(out: &Path, ball_radius: f64) -> Result<Self, CliError> {
+        let recording =
+            SegmentedWriter::replace(&out.join(RECORDING), &probe_topics()).map_err(CliError::not_written)?;
+        let path = out.join(TOUCHES);
+        let touches = TouchLog::create(&path, ball_radius).map_err(not_written(&path))?;
+        Ok(Self { touches, recording, offset_ns: None, last_ns: None, flushed_ns: i64::MIN })
+    }
+
+    /// Goes on with those of a folder.
+    ///
+    /// - `each`: receives the samples that are there.
+    pub fn resume(out: &Path, ball_radius: f64, each: &mut dyn FnMut(&Message)) -> Result<Self, CliError> {
+        let mut last_ns = None;
+        let frames = [BASE_FRAME, PROBE_FRAME];
+        let recording = SegmentedWriter::resume(&out.join(RECORDING), &probe_topics(), frames, &mut |message| {
+            last_ns = last_ns.max(Some(message.stamp_ns()));
+            each(message);
+        })?;
+        let path = out.join(TOUCHES);
+        let touches = TouchLog::resume(&path, ball_radius).map_err(not_written(&path))?;
+        Ok(Self { touches, recording, offset_ns: None, last_ns, flushed_ns: i64::MIN })
+    }
+
+    /// Writes a state as the messages of a probe: the pose in the base of the arm, as the scene says where the part is, and the wrench in
+    /// the axes of the probe, as its sensor would have it. `None` for one that is not later than the last.
+    pub fn record(&mut self, state: &ArmState) -> Result<Option<[Message; 2]>, CliError> {
+        let last_ns = self.last_ns;
+        let offset_ns = *self.offset_ns.get_or_insert(match last_ns {
+            Some(last) if state.stamp_ns <= last => last + PAUSE_NS - state.stamp_ns,
+            _ => 0,
+        });
+        let stamp_ns = state.stamp_ns + offset_ns;
+        if last_ns.is_some_and(|last| last >= stamp_ns) {
+            return Ok(None);
+        }
+        self.last_ns = Some(stamp_ns);
+        let turned = |v| state.pose_bt.rotation.inverse() * v;
+        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
+        let pose = Message::Pose(StampedPose { stamp_ns, pose_ot: state.pose_bt });
+        let wrench = Message::Wrench(StampedWrench { stamp_ns, wrench });
+        self.recording.write(&pose, BASE_FRAME).map_err(CliError::not_written)?;
+        self.recording.write(&wrench, PROBE_FRAME).map_err(CliError::not_written)?;
+        if stamp_ns.saturating_sub(self.flushed_ns) > FLUSH_EVERY_NS {
+            self.recording.flush().map_err(CliError::not_written)?;
+            self.flushed_ns = stamp_ns;
+        }
+        Ok(Some([pose, wrench]))
+    }
+
+    /// Writes a touch, after all samples of it.
+    pub fn touched(&mut self, flag: u32, touch: &ProbedTouch) -> Result<(), CliError> {
+        self.recording.sync().map_err(CliError::not_written)?;
+        let written = self.touches.append(flag, touch, self.offset_ns.unwrap_or(0));
+        written.map_err(not_written(self.touches.path()))
+    }
+
+    /// Ends the recording; returns how many touches were written.
+    pub fn finish(self) -> Result<usize, CliError> {
+        self.recording.finish().map_err(CliError::not_written)?;
+        Ok(self.touches.count())
+    }
+}

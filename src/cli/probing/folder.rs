@@ -1,0 +1,185 @@
+//! The folder of a probing: what was asked for, and which features are finished.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::files::{RECORDING, TOUCHES};
+use super::ready::Ready;
+use super::report::{ProbedRecord, kind_of};
+use crate::cli::{CliError, require, write_json};
+use crate::io::mesh_file::MeshUnit;
+use crate::io::probed_touches_file::{TouchLine, read_probed_touches};
+use crate::io::session_folder::{fingerprint, read_text};
+use crate::probing::execute::Flag;
+
+const REQUEST: &str = "probing.json";
+const RECORDS: &str = "probed.json";
+
+/// What a probing was asked for: `probing.json`. Another one is no continuation of it.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct ProbingRequest {
+    scene: PathBuf,
+    scene_crc32: u32,
+    scan: PathBuf,
+    scan_crc32: u32,
+    mesh_unit: MeshUnit,
+    is_simulated: bool,
+    flags: Vec<FlagRecord>,
+    settings: ProbingSettings,
+}
+
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct FlagRecord {
+    flag: u32,
+    kind: String,
+    place_mm: [f64; 3],
+    search_radius_mm: f64,
+}
+
+/// What the command line can change of the scene.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct ProbingSettings {
+    /// standard uncertainty that is wanted
+    sigma_mm: f64,
+    most_touches: usize,
+    largest_force_n: f64,
+    longest_s: f64,
+    slides: bool,
+}
+
+impl ProbingRequest {
+    /// - `scan`: its file and the unit of its coordinates.
+    pub fn new(
+        scene: &Path,
+        (scan, mesh_unit): (&Path, MeshUnit),
+        is_simulated: bool,
+        flags: &[Flag],
+        ready: &Ready,
+    ) -> Result<Self, CliError> {
+        let (scene, scene_crc32) = fingerprint(scene).map_err(not_read(scene))?;
+        let (scan, scan_crc32) = fingerprint(scan).map_err(not_read(scan))?;
+        let flag_record = |flag: &Flag| FlagRecord {
+            flag: flag.id,
+            kind: kind_of(flag).to_owned(),
+            place_mm: (flag.place * 1e3).coords.into(),
+            search_radius_mm: flag.radius * 1e3,
+        };
+        let params = &ready.params;
+        let settings = ProbingSettings {
+            sigma_mm: params.pattern.sigma * 1e3,
+            most_touches: params.pattern.budget,
+            largest_force_n: params.limits.force,
+            longest_s: params.limits.time,
+            slides: params.slides,
+        };
+        let flags = flags.iter().map(flag_record).collect();
+        Ok(Self { scene, scene_crc32, scan, scan_crc32, mesh_unit, is_simulated, flags, settings })
+    }
+
+    /// What differs from the request before; `None`: nothing that matters.
+    fn difference(&self, before: &Self) -> Option<&'static str> {
+        let differences = [
+            (self.is_simulated != before.is_simulated, "--robot"),
+            (self.scene_crc32 != before.scene_crc32, "the scene"),
+            ((self.scan_crc32, self.mesh_unit) != (before.scan_crc32, before.mesh_unit), "the scan or its unit"),
+            (self.flags != before.flags, "the list of features"),
+            (self.settings != before.settings, "tolerance, touches, force, time or slides"),
+        ];
+        differences.into_iter().find_map(|(differs, what)| differs.then_some(what))
+    }
+}
+
+fn not_read(path: &Path) -> impl FnOnce(std::io::Error) -> CliError {
+    move |error| CliError::new(("probing", 3), format_args!("{}: {error}", path.display()), Some(&error))
+}
+
+/// The folder that `--out` names.
+#[derive(Clone, Copy)]
+pub(super) struct ProbingFolder<'a> {
+    pub path: &'a Path,
+}
+
+impl ProbingFolder<'_> {
+    /// Begins a probing in the place of an older one.
+    pub fn begin(self, request: &ProbingRequest) -> Result<(), CliError> {
+        write_json(&self.path.join(REQUEST), request)?;
+        self.write(&[])
+    }
+
+    /// Refuses to write over a recording that no probing made, as that of a session.
+    pub fn check_own(self) -> Result<(), CliError> {
+        let recording = self.path.join(RECORDING);
+        let is_own = self.path.join(REQUEST).exists() || !recording.exists();
+        require(
+            is_own,
+            format_args!("{} is there and of no probing: name another folder by --out", recording.display()),
+        )
+    }
+
+    /// Refuses to write over touches of a probing that was broken off.
+    pub fn check_free(self) -> Result<(), CliError> {
+        let Some(request) = self.read::<ProbingRequest>(REQUEST)? else { return Ok(()) };
+        let records = self.records()?;
+        let is_over =
+            |flag: &FlagRecord| records.iter().any(|record| record.flag == flag.flag && !record.is_broken_off());
+        let is_done = request.flags.iter().all(is_over);
+        let finished = records.iter().filter(|record| !record.is_broken_off()).count();
+        let out = self.path.display();
+        let why = format!(
+            "{out} holds a probing that was broken off, with {finished} of {} features finished: go on with --resume, or name \
+             another folder by --out",
+            request.flags.len()
+        );
+        require(is_done || self.touches()?.is_empty(), why)
+    }
+
+    /// The features that are finished, where the probing of the folder is that which is asked for.
+    pub fn resume(self, request: &ProbingRequest) -> Result<Vec<ProbedRecord>, CliError> {
+        let out = self.path.display();
+        let none = || CliError::usage(format_args!("--resume: {out} holds no probing to go on with"));
+        let before = self.read::<ProbingRequest>(REQUEST)?.ok_or_else(none)?;
+        if let Some(what) = request.difference(&before) {
+            let why = format!(
+                "--resume: {what} differs from what the probing in {out} began with: repeat that command as it was, or probe \
+                 into another folder"
+            );
+            return Err(CliError::usage(why));
+        }
+        let mut records = self.records()?;
+        records.retain(ProbedRecord::is_finished);
+        Ok(records)
+    }
+
+    /// Writes the features that were probed so far.
+    pub fn write(self, records: &[ProbedRecord]) -> Result<(), CliError> {
+        write_json(&self.path.join(RECORDS), &BTreeMap::from([("features", records)]))
+    }
+
+    /// All touches.
+    pub fn touches(self) -> Result<Vec<TouchLine>, CliError> {
+        let path = self.path.join(TOUCHES);
+        read_probed_touches(&path).map_err(not_read(&path))
+    }
+
+    fn records(self) -> Result<Vec<ProbedRecord>, CliError> {
+        let records = self.read::<BTreeMap<String, Vec<ProbedRecord>>>(RECORDS)?;
+        Ok(records.and_then(|mut records| records.remove("features")).unwrap_or_default())
+    }
+
+    /// A file; `None` where it is not there.
+    fn read<T: DeserializeOwned>(self, name: &str) -> Result<Option<T>, CliError> {
+        let path = self.path.join(name);
+        let text = read_text(&path).map_err(not_read(&path))?;
+        if text.is_empty() {
+            return Ok(None);
+        }
+        let damaged = |error: serde_json::Error| {
+            let why = format!("{}: {error}; is that the folder of a probing?", path.display());
+            CliError::new(("probing", 3), why, None)
+        };
+        serde_json::from_str(&text).map(Some).map_err(damaged)
+    }
+}

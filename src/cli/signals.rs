@@ -1,0 +1,104 @@
+//! The signals that end a verb: SIGINT (Ctrl-C), SIGTERM, and of the node SIGHUP.
+
+use std::future::poll_fn;
+use std::io;
+use std::process::exit;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::task::Poll;
+use std::thread::Builder;
+
+use tokio::runtime;
+pub(super) use tokio::signal::unix::SignalKind;
+use tokio::signal::unix::{Signal, signal};
+
+use super::error::{CliError, INTERRUPTED};
+use super::notify;
+use crate::probing::arm::StopRequest;
+
+/// Calls `each` on a thread of its own with the number of signals until then, from 1 on.
+pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + Send + 'static) -> io::Result<()> {
+    let runtime = runtime::Builder::new_current_thread().enable_io().build()?;
+    let mut signals = {
+        let _entered = runtime.enter();
+        kinds.iter().map(|kind| signal(*kind)).collect::<io::Result<Vec<_>>>()?
+    };
+    let listen = move || {
+        for count in 1.. {
+            runtime.block_on(any(&mut signals));
+            each(count);
+        }
+    };
+    Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
+}
+
+/// Waits for any of them.
+async fn any(signals: &mut [Signal]) {
+    poll_fn(|context| match signals.iter_mut().any(|signal| signal.poll_recv(context).is_ready()) {
+        true => Poll::Ready(()),
+        false => Poll::Pending,
+    })
+    .await;
+}
+
+/// How the user has asked an arm to stop.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StopSignals {
+    count: Arc<AtomicU32>,
+    is_at_rest: Arc<AtomicBool>,
+}
+
+impl StopSignals {
+    /// Listens from now on: the first signal has the arm stop and retract, the second has it stay where it is.
+    ///
+    /// # Errors
+    /// Where the system has no thread for that: kind `signals`.
+    pub fn listen() -> Result<Self, CliError> {
+        let signals = Self::default();
+        let Self { count, is_at_rest } = signals.clone();
+        let each = move |number| {
+            if is_at_rest.load(Ordering::Acquire) {
+                exit(i32::from(INTERRUPTED.1));
+            }
+            count.store(number, Ordering::Release);
+            notify(match request_of(number) {
+                Some(StopRequest::Stay) => "the arm stops and stays where it is",
+                _ => "the arm stops and retracts; a second signal has it stay where it is",
+            });
+        };
+        let no_thread = |error| CliError::new(("signals", 1), format!("cannot listen to signals: {error}"), None);
+        on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate()], each).map_err(no_thread)?;
+        Ok(signals)
+    }
+
+    /// What the signals until now ask for.
+    pub fn request(&self) -> Option<StopRequest> {
+        request_of(self.count.load(Ordering::Acquire))
+    }
+
+    /// Nothing moves any more: the next signal ends the program at once.
+    pub fn arm_is_at_rest(&self) {
+        self.is_at_rest.store(true, Ordering::Release);
+    }
+}
+
+fn request_of(signals: u32) -> Option<StopRequest> {
+    match signals {
+        0 => None,
+        1 => Some(StopRequest::Retract),
+        _ => Some(StopRequest::Stay),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_signal_retracts_and_the_second_has_the_arm_stay() {
+        assert_eq!(
+            [0, 1, 2, 3].map(request_of),
+            [None, Some(StopRequest::Retract), Some(StopRequest::Stay), Some(StopRequest::Stay)]
+        );
+    }
+}

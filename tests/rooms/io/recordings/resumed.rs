@@ -1,0 +1,57 @@
+//! A recording that was cut off, as by a crash, and goes on.
+
+use std::fs;
+
+use touchup::io::recording::{RecordingReader, SegmentedWriter, Topics};
+use touchup::stylus::Message;
+
+use super::made::touch;
+use super::read_all;
+
+const FRAMES: [&str; 2] = ["O", "T"];
+
+fn write(writer: &mut SegmentedWriter, messages: &[Message]) {
+    for message in messages {
+        let is_wrench = matches!(message, Message::Wrench(_));
+        writer.write(message, FRAMES[usize::from(is_wrench)]).unwrap();
+    }
+}
+
+/// Wherever it is cut, all that was flushed before is there, and what comes then follows it; the result has its end.
+#[test]
+fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (recording, topics) = (folder.path().join("recording"), Topics::default());
+    let segment = recording.join("touch_0000.mcap");
+    let messages = touch(60);
+    let mut writer = SegmentedWriter::replace(&recording, &topics).unwrap();
+    let lengths = [20, 40].map(|count| {
+        write(&mut writer, &messages[count - 20..count]);
+        writer.sync().unwrap();
+        fs::metadata(&segment).unwrap().len() as usize
+    });
+    drop(writer);
+    let bytes = fs::read(&segment).unwrap();
+    assert!(0 < lengths[0] && lengths[0] < lengths[1] && lengths[1] < bytes.len());
+
+    for cut in (0..bytes.len()).step_by(61).chain(lengths).chain([lengths[0] - 1, lengths[1] - 1]) {
+        fs::write(&segment, &bytes[..cut]).unwrap();
+        let mut there = Vec::new();
+        let mut writer =
+            SegmentedWriter::resume(&recording, &topics, FRAMES, &mut |message| there.push(*message)).unwrap();
+        // at least what was flushed; of the rest all that can still be read
+        let flushed = 20 * lengths.iter().filter(|length| **length <= cut).count();
+        assert!(there.len() >= flushed && there.len() <= 40, "cut at {cut}: {}", there.len());
+        assert_eq!(there, messages[..there.len()], "cut at {cut}");
+        write(&mut writer, &messages[40..]);
+        writer.finish().unwrap();
+        assert!(recording.join("metadata.yaml").exists());
+        let all = [&there[..], &messages[40..]].concat();
+        assert_eq!(read_all(&recording, &topics), all, "cut at {cut}");
+        let reader = RecordingReader::open(&recording, &topics).unwrap();
+        assert!(!reader.truncated() && reader.message_count() == Some(all.len() as u64), "cut at {cut}");
+        // and once more from the beginning
+        SegmentedWriter::replace(&recording, &topics).unwrap();
+        assert_eq!(fs::read_dir(&recording).unwrap().count(), 0);
+    }
+}
