@@ -168,7 +168,7 @@ fn a_cancelled_probing_goes_no_deeper() {
 /// From 50 mm/s a stop takes 0.1 s, and a retraction is stopped as everything else is.
 #[test]
 fn a_probing_that_is_to_stay_stands_where_it_is() {
-    for (patience, stays_after) in [(None, 900), (None, 6000), (Some(6000), 6001), (Some(6000), 6100), (Some(900), 950)]
+    for (patience, stays_after) in [(None, 900), (None, 6000), (Some(6000), 6001), (Some(6000), 6020), (Some(900), 950)]
     {
         let mut world = StaticScan { patience, stays_after: Some(stays_after), ..StaticScan::new(plate_scan(1)) };
         let (probed, at_rest_since, _) = probed(&params(), &mut world, |_| {});
