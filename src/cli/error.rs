@@ -229,7 +229,14 @@ impl From<SpotError> for CliError {
 
 impl From<PayloadProbeError> for CliError {
     fn from(error: PayloadProbeError) -> Self {
-        if let PayloadProbeError::Ended(ending) = &error { Self::ended(ending) } else { Self::arm(error) }
+        match &error {
+            // nothing is retracted from free air
+            PayloadProbeError::Ended(Ending::Cancelled(_)) => {
+                Self::new(INTERRUPTED, "interrupted: the arm stopped in free air", None)
+            }
+            PayloadProbeError::Ended(ending) => Self::ended(ending),
+            PayloadProbeError::TooFew { .. } => Self::arm(error),
+        }
     }
 }
 
