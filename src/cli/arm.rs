@@ -42,22 +42,40 @@ const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in th
 /// [`CliError::usage`] where the scene names none, or touchup was built without it; [`CliError::arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    Ok(Box::new(UrArm::connect(&ur_params(scene)?).map_err(CliError::arm)?))
+}
+
+/// The UR of a scene, after its stop was cleared as far as a call can.
+///
+/// # Errors
+/// As [`connect_ur`]; [`CliError::stopped`] where it takes a hand at its panel.
+#[cfg(feature = "ur")]
+pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    Ok(Box::new(UrArm::recovered(&ur_params(scene)?).map_err(CliError::stopped)?))
+}
+
+#[cfg(feature = "ur")]
+fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
     let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
     let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
     let (robot, (cell, _)) = robot.ok_or_else(|| CliError::usage(NO_HOST))?;
-    let params = UrParams {
+    Ok(UrParams {
         pose_ft: cell.pose_ft,
         mass: robot.payload_mass,
         centre: robot.payload_centre,
         is_lock_step: std::env::var_os(LOCK_STEP).is_some(),
         ..UrParams::new(&robot.host, &robot.site_packages)
-    };
-    Ok(Box::new(UrArm::connect(&params).map_err(CliError::arm)?))
+    })
 }
 
 #[cfg(not(feature = "ur"))]
 pub(super) fn connect_ur(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     Err(CliError::usage(NO_UR))
+}
+
+#[cfg(not(feature = "ur"))]
+pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    connect_ur(scene)
 }
 
 #[cfg(not(feature = "ur"))]

@@ -91,6 +91,12 @@ impl CliError {
         Self::new(("arm", 1), error, None)
     }
 
+    /// An arm that stays stopped.
+    #[cfg(feature = "ur")]
+    pub fn stopped(error: impl Display) -> Self {
+        Self::new(STOPPED, error, None)
+    }
+
     /// How the work of an arm ended before it was done.
     pub fn ended(ending: &Ending) -> Self {
         match ending {

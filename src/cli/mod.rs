@@ -23,6 +23,7 @@ mod probe;
 mod probing;
 mod progress;
 mod rates;
+mod recover;
 mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
@@ -102,6 +103,8 @@ enum Verb {
     /// Checks the repeatability of an arm on one spot
     #[command(after_help = ARM_SIGNALS)]
     Check(check::CheckArguments),
+    /// Lets an arm that was stopped move again, once somebody has looked; nothing moves
+    Recover(recover::RecoverArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
     /// Measures error against run time, stability and cost on this machine: runs `touchup-report`, a program of its own
@@ -161,6 +164,7 @@ impl Verb {
             Self::Features(arguments) => features::features(arguments),
             Self::Probe(arguments) => probe::probe(arguments),
             Self::Check(arguments) => check::check(arguments),
+            Self::Recover(arguments) => recover::recover(arguments),
             Self::Simulate(arguments) => simulate::simulate(arguments),
             Self::Report(arguments) => report::report(arguments),
             #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -61,6 +61,15 @@ impl UrArm {
         Ok(Self { params: params.clone(), client, last })
     }
 
+    /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing moves.
+    ///
+    /// # Errors
+    /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`], [`ArmError::Refused`] where it cannot be connected.
+    pub fn recovered(params: &UrParams) -> Result<Self, ArmError> {
+        Self::unlock(params)?;
+        Self::connect(params).map_err(|error| Self::refused("to recover", error.to_string()))
+    }
+
     /// How the arm was stopped at the last fault of its connection or of its client; `None`: there was none.
     pub fn halt(&mut self) -> Option<Halt> {
         self.client.halt()
@@ -132,19 +141,19 @@ impl UrArm {
     }
 
     /// Clears the stop of the arm, as far as a call can.
-    fn unlock(&self) -> Result<(), ArmError> {
-        let silent_ms = self.params.deadlines.dashboard.as_millis() as u64;
+    fn unlock(params: &UrParams) -> Result<(), ArmError> {
+        let silent_ms = params.deadlines.dashboard.as_millis() as u64;
         let lost = |_: UrError| ArmError::Lost { silent_ms };
-        let mut dashboard = Dashboard::connect(&self.params.host, self.params.deadlines.dashboard).map_err(lost)?;
-        let clock = &self.params.clock;
+        let mut dashboard = Dashboard::connect(&params.host, params.deadlines.dashboard).map_err(lost)?;
+        let clock = &params.clock;
         let begun = clock.now();
         loop {
             match dashboard.safety().map_err(lost)? {
                 Safety::Normal => break,
                 // the controller lets itself be unlocked some seconds after the stop, not before
-                Safety::ProtectiveStop if clock.since(begun) < self.params.deadlines.connect => {
+                Safety::ProtectiveStop if clock.since(begun) < params.deadlines.connect => {
                     if !dashboard.unlock().map_err(lost)? {
-                        clock.sleep(self.params.deadlines.dashboard);
+                        clock.sleep(params.deadlines.dashboard);
                     }
                 }
                 safety => return Err(ArmError::Stopped { safety }),
@@ -195,7 +204,7 @@ impl Arm for UrArm {
     /// client clears them first. Tool, payload and watchdog are set again. The sensor is not zeroed, for the probe may still be
     /// pressed: back off, then [`crate::probing::arm::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
-        self.unlock()?;
+        Self::unlock(&self.params)?;
         self.client.close("was ended for a restart, and that failed");
         *self = Self::connect(&self.params).map_err(|error| Self::refused("to recover", error.to_string()))?;
         Ok(())

@@ -13,6 +13,7 @@ use touchup::probing::arm::{
 };
 use touchup::ur::{Halt, UrArm, UrError};
 
+use crate::probing::cell;
 use crate::stand_in::{Line, StandIn, limits};
 use crate::{LATENCY, Onlooker, PLACE, above, at, touched, with_library};
 
@@ -402,6 +403,39 @@ fn after_a_protective_stop_it_is_recovered() {
         // tool, payload and watchdog are set again: it touches as it did before
         let record = touched(&mut arm, &above(5e-3))?;
         assert!(matches!(record.outcome, TouchOutcome::Contact { .. }), "{:?}", record.outcome);
+        Ok(())
+    });
+}
+
+/// `touchup recover`: the program that drove it has ended, and a new one is refused until somebody says that he has looked.
+#[test]
+fn a_stopped_arm_is_recovered_by_a_verb_and_nothing_moves() {
+    with_library(|packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
+        let folder = cell(&stand_in, packages);
+        let recover = || {
+            let mut verb = std::process::Command::new(env!("CARGO_BIN_EXE_touchup"));
+            verb.env("TOUCHUP_UR_LOCK_STEP", "1")
+                .args(["recover", "--json", "--scene"])
+                .arg(folder.path().join("scene.yaml"));
+            verb.output().unwrap()
+        };
+        stand_in.send("operator");
+        let refused = recover();
+        assert_eq!(refused.status.code(), Some(5));
+        let why = String::from_utf8(refused.stderr).unwrap();
+        assert!(why.contains("stopped by the operator"), "{why}");
+        stand_in.send("release");
+        stand_in.send("protective");
+        let refused = UrArm::connect(&stand_in.params(packages)).err().unwrap();
+        assert!(matches!(refused, UrError::Stopped(Safety::ProtectiveStop)), "{refused}");
+        let recovered = recover();
+        assert_eq!(recovered.status.code(), Some(0), "{}", String::from_utf8_lossy(&recovered.stderr));
+        let state: serde_json::Value = serde_json::from_slice(&recovered.stdout).unwrap();
+        // in the base of the arm
+        assert!((state["tip_mm"][2].as_f64().unwrap() - 90.0).abs() < 0.1, "{state}");
+        assert!(stand_in.record().iter().all(|line| line.speed == 0.0), "nothing moves");
+        stand_in.connect(packages);
         Ok(())
     });
 }

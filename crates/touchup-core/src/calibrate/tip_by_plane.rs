@@ -101,7 +101,9 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     if rms.is_nan() || rms > FLAT {
         return Err(PlaneTipError::NotFlat { rms_mm: rms * 1e3 });
     }
-    let covariance = information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 6.0));
+    // the residuals of few touches know their own scale badly: the error is Student's t of n − 6, whose variance is larger by
+    // (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
+    let covariance = information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 8.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
     let offset = VectorEstimate::new(x.fixed_rows::<3>(0).into_owned(), &covariance);
     Ok(PlaneTipFit { offset, rms, touches: count })

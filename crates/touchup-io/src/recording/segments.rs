@@ -153,7 +153,7 @@ impl SegmentedWriter {
         std::mem::take(&mut self.unflushed)
     }
 
-    /// Ends the last file and writes [`METADATA`]; nothing when nothing was written. A recording of which a file has no
+    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording of which a file has no
     /// proper end gets none: touchup reads it by its files, as after a crash.
     ///
     /// # Errors

@@ -126,11 +126,11 @@ const FREEING: f64 = 2e-3;
 /// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
 const FREEING_WAY: f64 = 5e-3;
 /// A sensor is looked at for so long before it is zeroed, s.
-const STEADY: f64 = 0.05;
+const STEADY: f64 = 0.1;
 /// In which its mean may change by this, N …
-const DRIFT: f64 = 0.3;
+const DRIFT: f64 = 0.2;
 /// … and by this many of its standard deviations.
-const CHANGED: f64 = 4.0;
+const CHANGED: f64 = 3.0;
 /// Forces above the trigger in a row that are contact; one alone is noise.
 pub(super) const TRIGGERS: u32 = 2;
 
