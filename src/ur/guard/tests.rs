@@ -212,6 +212,13 @@ impl Watch {
         assert_eq!(self.hand.waiting(), 0, "it waits on");
     }
 
+    /// Asks the client to end, as which its pipe closes; how the guard stopped the arm.
+    fn end_on_request(self) -> Option<Halt> {
+        self.shared.known().close(self.shared.clock.now());
+        drop(self.reports);
+        self.guard.join().unwrap()
+    }
+
     /// The end of the guard, the fault, and the requests to the dashboard.
     fn end(self) -> (Option<Halt>, Option<ClientLoss>, Vec<String>) {
         let begun = Instant::now();
@@ -353,10 +360,7 @@ fn a_program_that_somebody_pauses_is_ended_once() {
         let was_paused = matches!(&stopped, ClientReport::State(state) if state.program == Paused);
         assert_eq!(reason, if was_paused { ArmError::ProgramPaused } else { ArmError::ProgramEnded });
         assert!(watch.asked.try_recv().is_err() && watch.shared.known().broken.is_none());
-        watch.shared.known().close(watch.shared.clock.now());
-        let Watch { guard, reports, .. } = watch;
-        drop(reports);
-        guard.join().unwrap();
+        assert_eq!(watch.end_on_request(), None);
     }
 }
 
@@ -366,4 +370,5 @@ fn a_program_that_has_ended_by_itself_is_not_stopped_again() {
     watch.say(ClientReport::Ready);
     watch.say(state(Ended, 1 << 2, 0));
     watch.is_calm_after(MS);
+    assert_eq!(watch.end_on_request(), None);
 }
