@@ -116,6 +116,7 @@ units! {
     PERCENT "%" per 100.0;
     N_PER_MM "N/mm" times 1e3;
     DEG "degrees" times std::f64::consts::PI / 180.0;
+    DEG_PER_S "degrees/s" times std::f64::consts::PI / 180.0;
 }
 
 impl Unit {

@@ -67,6 +67,8 @@ robot.tip_position_mm mm [0,0,150] -2000 2000
 robot.tip_orientation_xyzw length [1,0,0,0] 0.999 1.001
 robot.workspace_low_mm mm [0,0,0] -5000 5000
 robot.workspace_high_mm mm [0,0,0] -5000 5000
+robot.arm_low_mm mm - -5000 5000
+robot.arm_high_mm mm - -5000 5000
 robot.touch_force_n N 3 0.1 100
 robot.trigger_n N 1 0.05 80
 robot.largest_force_n N 15 0.1 100
@@ -76,6 +78,7 @@ robot.search_mm_per_s mm/s 10 0.1 250
 robot.measure_mm_per_s mm/s 2 0.05 250
 robot.slide_mm_per_s mm/s 10 0.1 250
 robot.largest_mm_per_s mm/s 100 0.1 250
+robot.largest_joint_deg_per_s degrees/s 90 1 360
 robot.acceleration_mm_per_s2 mm/s² 500 10 5000
 robot.fault_stop_mm_per_s2 mm/s² 5000 10 10000
 robot.largest_tare_n N 5 0.1 100
@@ -221,6 +224,7 @@ fn each_parameter_is_explained_and_has_its_unit_in_its_key() {
         ("1/(N²·s)", "_per_n2_s"),
         ("%", "_percent"),
         ("degrees", "_deg"),
+        ("degrees/s", "_deg_per_s"),
     ];
     for one in declared() {
         let summary = one.summary();
@@ -268,6 +272,7 @@ fn written(row: &Row, x: f64) -> String {
         "offset_mm",
         "region_",
         "workspace_",
+        "robot.arm_",
     ];
     match row.key {
         _ if row.unit == "length" => format!("[{x}, 0, 0, 0]"),

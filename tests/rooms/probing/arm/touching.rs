@@ -39,7 +39,7 @@ fn at(params: &ArmParams, place: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity())
 }
 
-fn touched(arm: &mut SimArm, touching: &TouchParams, target: &TouchTarget) -> Result<TouchRecord, ProbeError> {
+fn touched(arm: &mut dyn Arm, touching: &TouchParams, target: &TouchTarget) -> Result<TouchRecord, ProbeError> {
     let mut onlooker = Onlooker;
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     watched.zero()?;
@@ -362,6 +362,48 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
         let stood = arm.at_rest_since() - at_s;
         assert!(stood < 0.2, "{fault:?}: after {stood} s");
         println!("{fault:?}: {error}; at rest after {:.0} ms", stood.max(0.0) * 1e3);
+    }
+}
+
+/// From its 500th state on the arm says that it moves ten times as fast, that a joint turns by itself, or that its clock was set back.
+#[test]
+fn an_arm_that_is_too_fast_or_whose_clock_goes_back_is_stopped() {
+    let (plate, params) = (Plate::default(), ArmParams::default());
+    type Alter = fn(&mut ArmState, f64);
+    let faults: [(Alter, IsTrue); 3] = [
+        (
+            |state, seconds| state.pose_bt.translation.vector.x += 0.3 * seconds,
+            |e| matches!(e, ProbeError::Limit { error: LimitError::Speed { mm_per_s, .. }, .. } if *mm_per_s > 125.0),
+        ),
+        (
+            |state, seconds| state.joints[3] += 3.0 * seconds,
+            |e| matches!(e, ProbeError::Limit { error: LimitError::JointSpeed { joint: 4, .. }, .. }),
+        ),
+        (
+            |state, _| state.stamp_ns -= 70_000_000,
+            |e| matches!(e, ProbeError::Arm { error: ArmError::WentBack { back_ms }, .. } if (67.0..69.0).contains(back_ms)),
+        ),
+    ];
+    for (alter, is_true) in faults {
+        let arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
+        let (mut seen, mut told) = (0u32, 0);
+        let alter = |state: &mut ArmState| {
+            seen += 1;
+            if seen >= 500 {
+                told += 1;
+                alter(state, f64::from(seen - 500) * 2e-3);
+            }
+        };
+        let mut altered = Altered { arm, alter };
+        let target = down(&params, [45e-3, 8e-3, 22e-3]);
+        let touch = TouchParams { search_speed: 2e-3, ..TouchParams::default() };
+        let error = touched(&mut altered, &touch, &target).unwrap_err();
+        assert!(is_true(&error), "{error}");
+        let begun = altered.arm.time();
+        altered.arm.advance(0.5);
+        assert!(altered.arm.at_rest_since() - begun < 0.05, "{error}");
+        println!("{error}");
+        assert!(told <= 11, "{told} states until it was seen");
     }
 }
 

@@ -348,7 +348,7 @@ fn the_payload_is_identified_within_its_stated_uncertainty() {
         println!("{found}");
         let number = |key: &str| found[key].as_f64().unwrap();
         let (off, std) = (number("mass_kg") - 1.17, number("mass_std_kg"));
-        // thirteen means of 500 readings with 0.15 N: 6.7 mN each, on 11.5 N some parts in a thousand
+        // eleven means of 500 readings with 0.15 N: 6.7 mN each, on 11.5 N some parts in a thousand
         assert!(off.abs() < 3.0 * std && std < 1e-3, "{off} ± {std} kg");
         let [force, torque] = [[0.4, -0.3, 1.1], [0.05, -0.08, 0.02]];
         for (key, expected) in [("centre_mm", [3.0, -2.0, 42.0]), ("bias_force_n", force), ("bias_torque_nm", torque)] {
@@ -357,8 +357,11 @@ fn the_payload_is_identified_within_its_stated_uncertainty() {
                 assert!((value - expected[axis]).abs() < 3.0 * std, "{key} {axis}: {value} ± {std}");
             }
         }
-        assert_eq!(found["static_segments"], 13);
-        assert_eq!(found["not_reached"].as_array().unwrap().len(), 0);
+        assert_eq!(found["static_segments"], 11);
+        // 360 mm before its base two of the tilts bring the wrist to the arm's own links
+        let not_reached = found["not_reached"].as_array().unwrap();
+        assert_eq!(not_reached.len(), 2);
+        assert!(not_reached.iter().all(|why| why.as_str().unwrap().contains("link of the wrist")), "{not_reached:?}");
         // the scene with it differs in its two keys alone
         let [before, after] =
             ["scene.yaml", "calibrated.yaml"].map(|name| fs::read_to_string(folder.path().join(name)));
@@ -367,7 +370,7 @@ fn the_payload_is_identified_within_its_stated_uncertainty() {
         assert!(
             matches!(added[..], [kg, mm] if kg.trim().starts_with("payload_kg: 1.1") && mm.contains("payload_centre_mm: ["))
         );
-        assert!(after.contains("# touchup calibrate payload: 13 orientations"), "{after}");
+        assert!(after.contains("# touchup calibrate payload: 11 orientations"), "{after}");
     }
 }
 

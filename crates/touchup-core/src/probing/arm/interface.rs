@@ -98,6 +98,12 @@ pub enum ArmError {
     /// The states come with equal stamps.
     #[error("the arm's clock is stuck: its controller has stopped")]
     Stale,
+    /// The stamps go back.
+    #[error("the arm's clock went back by {back_ms:.0} ms: its controller has started again, or two arms answer")]
+    WentBack {
+        /// ms
+        back_ms: f64,
+    },
     /// It is not allowed to move.
     #[error("the arm is stopped: {safety}")]
     Stopped {

@@ -28,17 +28,63 @@ pub struct UrGeometry {
     pub d5: f64,
     /// m
     pub d6: f64,
+    /// how far the upper arm runs beside the shoulder's centre, along the axis of the shoulder, m
+    pub upper_arm_beside: f64,
+    /// … and the forearm, m
+    pub forearm_beside: f64,
+    /// of base, upper arm, forearm and wrist, the thickest place of each, m
+    pub radii: [f64; 4],
 }
 
 impl UrGeometry {
-    /// As the maker states them.
-    pub const UR3E: Self = Self { d1: 0.15185, a2: -0.24355, a3: -0.2132, d4: 0.13105, d5: 0.08535, d6: 0.0921 };
-    /// As the maker states them.
-    pub const UR5E: Self = Self { d1: 0.1625, a2: -0.425, a3: -0.3922, d4: 0.1333, d5: 0.0997, d6: 0.0996 };
-    /// As the maker states them.
-    pub const UR10E: Self = Self { d1: 0.1807, a2: -0.6127, a3: -0.57155, d4: 0.17415, d5: 0.11985, d6: 0.11655 };
-    /// As the maker states them.
-    pub const UR16E: Self = Self { d1: 0.1807, a2: -0.4784, a3: -0.36, d4: 0.17415, d5: 0.11985, d6: 0.11655 };
+    /// Lengths as the maker states them, radii from the maker's drawings, rounded up.
+    pub const UR3E: Self = Self {
+        d1: 0.15185,
+        a2: -0.24355,
+        a3: -0.2132,
+        d4: 0.13105,
+        d5: 0.08535,
+        d6: 0.0921,
+        upper_arm_beside: 0.120,
+        forearm_beside: 0.027,
+        radii: [0.064, 0.050, 0.045, 0.040],
+    };
+    /// As there.
+    pub const UR5E: Self = Self {
+        d1: 0.1625,
+        a2: -0.425,
+        a3: -0.3922,
+        d4: 0.1333,
+        d5: 0.0997,
+        d6: 0.0996,
+        upper_arm_beside: 0.138,
+        forearm_beside: 0.007,
+        radii: [0.075, 0.062, 0.058, 0.047],
+    };
+    /// As there.
+    pub const UR10E: Self = Self {
+        d1: 0.1807,
+        a2: -0.6127,
+        a3: -0.57155,
+        d4: 0.17415,
+        d5: 0.11985,
+        d6: 0.11655,
+        upper_arm_beside: 0.176,
+        forearm_beside: 0.039,
+        radii: [0.095, 0.080, 0.070, 0.060],
+    };
+    /// As there.
+    pub const UR16E: Self = Self {
+        d1: 0.1807,
+        a2: -0.4784,
+        a3: -0.36,
+        d4: 0.17415,
+        d5: 0.11985,
+        d6: 0.11655,
+        upper_arm_beside: 0.176,
+        forearm_beside: 0.049,
+        radii: [0.095, 0.080, 0.070, 0.060],
+    };
 
     /// Of a model, by the name that `ur_type` has in ROS.
     pub fn of(name: &str) -> Option<Self> {
@@ -48,7 +94,7 @@ impl UrGeometry {
 
     /// d, a and α of each, m and rad.
     fn links(&self) -> [(f64, f64, f64); 6] {
-        let Self { d1, a2, a3, d4, d5, d6 } = *self;
+        let Self { d1, a2, a3, d4, d5, d6, .. } = *self;
         let (d, a) = ([d1, 0.0, 0.0, d4, d5, d6], [0.0, a2, a3, 0.0, 0.0, 0.0]);
         let alpha = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
         std::array::from_fn(|i| (d[i], a[i], alpha[i]))
@@ -56,7 +102,16 @@ impl UrGeometry {
 
     /// Pose of the flange in the base B.
     pub fn flange(&self, joints: &Joints) -> Isometry3<f64> {
-        self.links().iter().zip(joints).fold(Isometry3::identity(), |pose, (link, angle)| pose * step(link, *angle))
+        self.link_poses(joints)[5]
+    }
+
+    /// Pose of the end of each link in B, in the axes of the joint there; the last is the flange.
+    pub(super) fn link_poses(&self, joints: &Joints) -> [Isometry3<f64>; 6] {
+        let (links, mut pose) = (self.links(), Isometry3::identity());
+        std::array::from_fn(|i| {
+            pose *= step(&links[i], joints[i]);
+            pose
+        })
     }
 
     /// Velocity of the flange by those of the joints: three rows of m/s, three of rad/s, in B.

@@ -1,10 +1,13 @@
 //! The limits of an arm, which no request can exceed.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::parameters;
 use crate::parameters::SettingError;
 
+use super::bodies::{ArmBodies, Link};
 use super::interface::ArmState;
 use super::kinematics::{Joints, UrGeometry};
 
@@ -23,6 +26,15 @@ parameters! {
         ///
         /// m in B.
         highest: Point3<f64> = [0.0; 3], "workspace_high_mm" [MM, -5000, 5000];
+        /// Smallest corner of the box that all of the arm but its base stays in, in the base of the arm: the table, walls; left out:
+        /// nothing is known of them.
+        ///
+        /// m in B.
+        arm_lowest: Option<Point3<f64>> = None, "arm_low_mm" [MM, -5000, 5000] like "[-2000, -2000, 0]";
+        /// Largest corner of it.
+        ///
+        /// m in B.
+        arm_highest: Option<Point3<f64>> = None, "arm_high_mm" [MM, -5000, 5000] like "[2000, 2000, 2000]";
         /// Force at the tip at which everything stops; well below that of the arm's own safety system.
         ///
         /// In N: that of a UR may be set to 50 N at the least.
@@ -31,12 +43,16 @@ parameters! {
         ///
         /// In m/s.
         speed: f64 = 100.0, "largest_mm_per_s" [MM_PER_S, 0.1, 250];
+        /// No joint turns faster: it does near a pose where the arm is nearly stuck.
+        ///
+        /// In rad/s.
+        joint_speed: f64 = 90.0, "largest_joint_deg_per_s" [DEG_PER_S, 1, 360];
         /// Acceleration of all motions.
         ///
         /// Of the tip, m/s².
         acceleration: f64 = 500.0, "acceleration_mm_per_s2" [MM_PER_S2, 10, 5000];
-        /// Deceleration of a stop at a fault or at a contact that nobody expected; the least of it bounds every speed, so that the
-        /// force at such a contact stays below largest_force_n.
+        /// Deceleration of a stop at a fault or at an unexpected contact. The largest speed of every motion follows from it and from
+        /// tip.stiffness_n_per_mm, so that the force at such a contact stays below largest_force_n.
         ///
         /// Of the tip, m/s².
         braking: f64 = 5000.0, "fault_stop_mm_per_s2" [MM_PER_S2, 10, 10000];
@@ -85,6 +101,72 @@ pub enum LimitError {
         dexterity: f64,
         /// the limit
         least: f64,
+    },
+    /// A straight way that its joints cannot follow.
+    #[error(
+        "near ({:.1} {:.1} {:.1}) mm a joint would have to turn by {turn_deg:.0}° at once: no straight way leads there with this orientation",
+        place_mm[0], place_mm[1], place_mm[2]
+    )]
+    Jump {
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// °
+        turn_deg: f64,
+    },
+    /// The arm would meet itself.
+    #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} is {gap_mm:.1} mm from its {other}, {least_mm:.0} mm are the least",
+            place_mm[0], place_mm[1], place_mm[2])]
+    OwnLinks {
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// one of the two
+        link: Link,
+        /// the other
+        other: Link,
+        /// between them, mm
+        gap_mm: f64,
+        /// the limit, mm
+        least_mm: f64,
+    },
+    /// A link would leave the box of the arm.
+    #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} leaves robot.arm_low_mm to arm_high_mm by {by_mm:.0} mm",
+            place_mm[0], place_mm[1], place_mm[2])]
+    ArmBox {
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// which
+        link: Link,
+        /// mm
+        by_mm: f64,
+    },
+    /// A link would be in the part.
+    #[error("with the tip at ({:.1} {:.1} {:.1}) mm its {link} is nearer than {least_mm:.0} mm to the part by the mesh",
+            place_mm[0], place_mm[1], place_mm[2])]
+    Part {
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// which
+        link: Link,
+        /// the limit, mm
+        least_mm: f64,
+    },
+    /// It moves too fast.
+    #[error("the tip moves with {mm_per_s:.0} mm/s, over the limit of {limit_mm_per_s:.0} mm/s")]
+    Speed {
+        /// mm/s
+        mm_per_s: f64,
+        /// mm/s
+        limit_mm_per_s: f64,
+    },
+    /// A joint turns too fast.
+    #[error("joint {joint} turns with {deg_per_s:.0}°/s, over the limit of {limit_deg_per_s:.0}°/s")]
+    JointSpeed {
+        /// from 1 on, at the base
+        joint: usize,
+        /// °/s
+        deg_per_s: f64,
+        /// °/s
+        limit_deg_per_s: f64,
     },
     /// More than the configuration allows.
     #[error("{what} of {asked} {unit} is beyond the configured {limit} {unit}: a request can only ask for less")]
@@ -144,6 +226,10 @@ impl Limits {
         self.lowest.iter().zip(self.highest.iter()).try_for_each(|(low, high)| {
             let allowed = "robot.workspace_low_mm to 5000 mm";
             SettingError::check("robot.workspace_high_mm", high * 1e3, high >= low, allowed)
+        })?;
+        let (Some(lowest), Some(highest)) = (self.arm_lowest, self.arm_highest) else { return Ok(()) };
+        lowest.iter().zip(highest.iter()).try_for_each(|(low, high)| {
+            SettingError::check("robot.arm_high_mm", high * 1e3, high > low, "above robot.arm_low_mm")
         })
     }
 
@@ -184,7 +270,7 @@ impl Limits {
     /// - `pose_ft`: the tip in the flange.
     ///
     /// # Errors
-    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::Singular`].
+    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::Singular`], [`LimitError::OwnLinks`], [`LimitError::ArmBox`].
     pub fn check_pose(
         &self,
         geometry: &UrGeometry,
@@ -196,14 +282,42 @@ impl Limits {
         self.check_place(&place)?;
         let place_mm = millimetres(&place);
         let solutions = geometry.inverse(&(pose_bt * pose_ft.inverse()), near);
-        let travel = |joints: &Joints| joints.iter().zip(near).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let nearest = solutions.into_iter().min_by(|a, b| travel(a).total_cmp(&travel(b)));
+        let unwound = solutions.into_iter().map(|joints| unwound(&joints, near));
+        let in_range = unwound.filter(|joints| joints.iter().all(|angle| angle.abs() <= JOINT_RANGE));
+        let nearest = in_range.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
         let joints = nearest.ok_or(LimitError::Reach { place_mm })?;
         let dexterity = geometry.dexterity(&joints);
         if dexterity < self.dexterity {
             return Err(LimitError::Singular { place_mm, dexterity, least: self.dexterity });
         }
+        self.check_links(&ArmBodies::new(geometry, &joints, pose_ft), place_mm)?;
         Ok(joints)
+    }
+
+    /// Whether its links keep clear of each other, and in the box of the arm.
+    fn check_links(&self, bodies: &ArmBodies, place_mm: [f64; 3]) -> Result<(), LimitError> {
+        let (link, other, gap) = bodies.nearest_pair();
+        if gap < LINK_GAP {
+            return Err(LimitError::OwnLinks { place_mm, link, other, gap_mm: gap * 1e3, least_mm: LINK_GAP * 1e3 });
+        }
+        // the base is bolted to what limits the others
+        for (link, capsule) in bodies.links().filter(|(link, _)| *link != Link::Base) {
+            let beyond = |end: &Point3<f64>| {
+                let low = self.arm_lowest.map(|low| (low - end).max() + capsule.radius);
+                let high = self.arm_highest.map(|high| (end - high).max() + capsule.radius);
+                low.into_iter().chain(high).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let by = capsule.ends.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max);
+            if by > 0.0 {
+                return Err(LimitError::ArmBox { place_mm, link, by_mm: by * 1e3 });
+            }
+        }
+        Ok(())
+    }
+
+    /// The deceleration of a stop at a fault, m/s²: no stop is softer than that of any motion.
+    pub(crate) fn fault_stop(&self) -> f64 {
+        self.braking.max(self.acceleration)
     }
 
     /// Whether an arm is within them now.
@@ -218,6 +332,21 @@ impl Limits {
     }
 }
 
-fn millimetres(place: &Vector3<f64>) -> [f64; 3] {
+/// A joint of a UR turns by no more from its zero, rad.
+const JOINT_RANGE: f64 = TAU;
+/// Links keep so far from each other, m: the radius of a probe, and what capsules leave out.
+const LINK_GAP: f64 = 10e-3;
+
+/// The same angles, each within half a turn of another.
+fn unwound(joints: &Joints, near: &Joints) -> Joints {
+    std::array::from_fn(|i| joints[i] + TAU * ((near[i] - joints[i]) / TAU).round())
+}
+
+/// By how far the joint turns that turns most, rad.
+pub(crate) fn largest_turn(from: &Joints, to: &Joints) -> f64 {
+    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+pub(crate) fn millimetres(place: &Vector3<f64>) -> [f64; 3] {
     (place * 1e3).into()
 }

@@ -4,18 +4,22 @@
 //! was touched: where the curve of force over travel bends ([`find_onset`]), not where the arm came to rest. [`Watched::slide`] presses with a
 //! constant force and follows a path.
 
+mod bodies;
 mod interface;
 mod kinematics;
 mod limits;
+mod measured_motion;
 mod onset;
 mod sliding;
 mod touch_params;
 mod touching;
 mod watched;
 
+pub use bodies::{ArmBodies, Capsule, Link};
 pub use interface::{Arm, ArmError, ArmState, Command, Safety};
 pub use kinematics::{Joints, UrGeometry};
 pub use limits::{LimitError, Limits, Narrower};
+pub(crate) use limits::{largest_turn, millimetres};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
 pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
 pub use touch_params::{CRAWL, TouchParams, UNEXPECTED};

@@ -91,6 +91,11 @@ const SLIDING: &str = "sliding over the surface";
 struct Slid<'a> {
     target: &'a SlideTarget,
     params: &'a TouchParams,
+    /// along the path, m/s
+    speed: f64,
+    /// of the last command, m/s in B; by how much it may change with each, m/s
+    feed: Vector3<f64>,
+    ramp: f64,
     station: usize,
     /// when the ball began to move along and when it was seen last, ns
     stamps_ns: [i64; 2],
@@ -124,16 +129,17 @@ impl Slid<'_> {
     }
 
     fn press(&self, normal: &Unit<Vector3<f64>>, feed: Vector3<f64>) -> Command {
-        let speed = self.params.slide_speed.min(self.params.search_speed);
+        let speed = self.speed.min(self.params.search_speed);
         Command::Press { axis: -normal.into_inner(), force: self.params.force, feed, speed }
     }
 
-    /// On along the path, and back to it where the ball is beside it.
-    fn command(&self, place: &Vector3<f64>) -> Command {
+    /// On along the path, and back to it where the ball is beside it; no faster than a slide may be, and with no more than the
+    /// acceleration that is allowed.
+    fn command(&mut self, place: &Vector3<f64>) -> Command {
         let Station { centre, normal: here } = self.target.stations[self.station];
         let next = self.target.stations[self.station + 1].normal;
         let (direction, length) = self.ahead();
-        let speed = self.params.slide_speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
+        let speed = self.speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
         // where the ball is when the command takes effect: half of the latency is the transmission
         let gone = (place - centre.coords).dot(&direction) + speed * self.params.latency / 2.0;
         let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
@@ -141,7 +147,9 @@ impl Slid<'_> {
         let side = normal.cross(&direction);
         let beside = (place - centre.coords).dot(&side);
         let along = direction - normal.into_inner() * direction.dot(&normal);
-        self.press(&normal, along * speed - side * (beside * BACK_TO_PATH).clamp(-speed, speed))
+        let wanted = (along * speed - side * (beside * BACK_TO_PATH)).cap_magnitude(speed);
+        self.feed += (wanted - self.feed).cap_magnitude(self.ramp);
+        self.press(&normal, self.feed)
     }
 
     /// Keeps the state; how the slide ended, if it has.
@@ -167,7 +175,7 @@ impl Slid<'_> {
         let pairs = self.target.stations.windows(2);
         let seconds = |pair: &[Station]| {
             let turn = pair[0].normal.angle(&pair[1].normal);
-            ((pair[1].centre - pair[0].centre).norm() / self.params.slide_speed).max(turn / TURNING)
+            ((pair[1].centre - pair[0].centre).norm() / self.speed).max(turn / TURNING)
         };
         pairs.map(seconds).sum()
     }
@@ -184,7 +192,10 @@ impl Watched<'_> {
         self.reached = Some(0);
         let stamps_ns = [self.next(SLIDING)?.stamp_ns; 2];
         let window = (WINDOW / self.arm.period()).ceil() as usize;
-        let mut slid = Slid { target, params, station: 0, stamps_ns, forces: Vec::new(), none: 0, against: 0, window };
+        let speed = params.slide_speed.min(params.bounded_speed(&self.limits));
+        let (feed, ramp) = (Vector3::zeros(), self.limits.acceleration * self.arm.period());
+        let (station, forces, none, against) = (0, Vec::new(), 0, 0);
+        let mut slid = Slid { target, params, speed, feed, ramp, station, stamps_ns, forces, none, against, window };
         let mut ending = SlideEnding::NoSurface;
         if self.find_surface(target, params)? {
             self.settle(&slid)?;

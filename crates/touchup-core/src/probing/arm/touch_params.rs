@@ -83,8 +83,7 @@ impl TouchParams {
     /// Speed at which whatever the tip meets is pressed with no more than the largest force, where it stops as hard as it may once it
     /// feels a contact; m/s.
     pub(crate) fn bounded_speed(&self, limits: &Limits) -> f64 {
-        let braking = limits.braking.max(limits.acceleration);
-        self.speed_below(limits.force - UNEXPECTED * self.trigger, braking).min(limits.speed).max(CRAWL)
+        self.speed_below(limits.force - UNEXPECTED * self.trigger, limits.fault_stop()).min(limits.speed).max(CRAWL)
     }
 
     /// - `room`: by which the force may grow, N; `deceleration`: m/s².

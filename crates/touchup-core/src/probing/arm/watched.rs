@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::interface::{Arm, ArmError, ArmState, Command, Safety};
 use super::limits::{LimitError, Limits};
+use super::measured_motion::MeasuredMotion;
 use super::touch_params::{TouchParams, UNEXPECTED};
 
 /// Why probing was broken off. The arm was commanded to stop before this was made.
@@ -163,6 +164,7 @@ pub struct Watched<'a> {
     observer: &'a mut dyn Observer,
     pub(super) last: Option<ArmState>,
     frozen: u32,
+    motion: MeasuredMotion,
     pub(super) peak_force: f64,
     /// The station that the ball has come to on the current slide, also where that breaks off; of a touch 0 from its stand-off on.
     /// `None` while it is not at the first.
@@ -177,7 +179,19 @@ impl<'a> Watched<'a> {
     /// - `observer`: receives each state, and may stop it.
     pub fn new(arm: &'a mut dyn Arm, limits: Limits, observer: &'a mut dyn Observer) -> Self {
         let (peak_force, heeds) = (0.0, StopRequest::Retract);
-        Self { arm, limits, observer, last: None, frozen: 0, peak_force, reached: None, heeds, comes_free: false }
+        let motion = MeasuredMotion::default();
+        Self {
+            arm,
+            limits,
+            observer,
+            last: None,
+            frozen: 0,
+            motion,
+            peak_force,
+            reached: None,
+            heeds,
+            comes_free: false,
+        }
     }
 
     /// The largest force of the current touch, or of all lines where there was none, N; and when the arm was seen last, by its clock, ns:
@@ -202,6 +216,9 @@ impl<'a> Watched<'a> {
         self.observer.on_state(&state);
         if let Some(last) = self.last.replace(state) {
             let gap = (state.stamp_ns - last.stamp_ns) as f64 * 1e-9;
+            if gap < 0.0 {
+                return Err(arm(ArmError::WentBack { back_ms: -gap * 1e3 }));
+            }
             self.frozen = if gap > 0.0 { 0 } else { self.frozen + 1 };
             if self.frozen >= FROZEN {
                 return Err(arm(ArmError::Stale));
@@ -214,6 +231,10 @@ impl<'a> Watched<'a> {
             return Err(arm(ArmError::Stopped { safety: state.safety }));
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
+        // frozen stamps have no speed
+        if self.frozen == 0 {
+            self.motion.take(&state, &self.limits).map_err(|error| ProbeError::Limit { doing, error })?;
+        }
         match self.limits.check_state(&state) {
             Err(LimitError::Force { .. }) if self.comes_free => {}
             checked => checked.map_err(|error| ProbeError::Limit { doing, error })?,
@@ -229,7 +250,7 @@ impl<'a> Watched<'a> {
     }
 
     fn hard_stop(&self) -> Command {
-        Command::Stop { deceleration: self.limits.braking.max(self.limits.acceleration) }
+        Command::Stop { deceleration: self.limits.fault_stop() }
     }
 
     pub(super) fn send(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
@@ -392,6 +413,7 @@ impl<'a> Watched<'a> {
         self.arm.zero_sensor().map_err(|error| ProbeError::Arm { doing, error })?;
         // that took its time
         self.last = None;
+        self.motion.forget();
         Ok(())
     }
 
@@ -447,6 +469,7 @@ impl<'a> Watched<'a> {
         travel: f64,
         until: &mut dyn FnMut(&ArmState) -> bool,
     ) -> Result<bool, ProbeError> {
+        let velocity = velocity * (self.limits.speed / velocity.norm()).min(1.0);
         let command = Command::Velocity { linear: velocity, acceleration: self.limits.acceleration };
         let begun = self.next(doing)?;
         let limit_s = PATIENCE.0 * travel / velocity.norm() + PATIENCE.1;

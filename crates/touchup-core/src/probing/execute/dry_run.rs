@@ -80,21 +80,22 @@ pub fn plan(
     let space = FreeSpace { cell, limits: &params.limits, world };
     let mut at = ToolState::of(cell, now);
     let mut plan = Plan { path: vec![at.place], ..Plan::default() };
-    let reach = |reached: Result<Joints, LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
-        let joints = reached?;
-        for (place, turned) in space.route(at, &rotation, above)?.stops {
+    let reach = |allowed: Result<(), LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
+        allowed?;
+        let route = space.route(at, &rotation, above)?;
+        for (place, turned) in route.stops {
             plan.links.push([at.place, place]);
             plan.path.push(place);
             (at.place, at.rotation) = (place, turned);
         }
-        at.joints = joints;
+        at.joints = route.joints;
         Ok::<_, Ending>(())
     };
     while let Some(planned) = explorer.next_touch() {
         let what = PlannedMotion::Touch(plan.touches.len());
         plan.touches.push(planned);
-        let reached = space.may_touch(&rotation, &planned, &at.joints);
-        if let Err(ending) = reach(reached, &planned.entry, &mut at, &mut plan) {
+        let allowed = space.may_touch(&rotation, &planned, &at.joints);
+        if let Err(ending) = reach(allowed, &planned.entry, &mut at, &mut plan) {
             plan.held_back.push(HeldBack { what, why: ending.why() });
             explorer.take(&TouchResult::Unclear);
             continue;
@@ -108,8 +109,8 @@ pub fn plan(
     let slides = if params.slides { explorer.slides() } else { Vec::new() };
     for slide in slides {
         let what = PlannedMotion::Slide(plan.slides.len());
-        let reached = space.may_slide(&rotation, &slide, &at.joints);
-        match reach(reached, &slide.above(0), &mut at, &mut plan) {
+        let allowed = space.may_slide(&rotation, &slide, &at.joints);
+        match reach(allowed, &slide.above(0), &mut at, &mut plan) {
             Ok(()) => {
                 let last = slide.stations.len() - 1;
                 plan.path.extend([slide.above(0), slide.lifted(0)]);

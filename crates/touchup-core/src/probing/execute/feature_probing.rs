@@ -194,7 +194,7 @@ impl FeatureProbing<'_, '_> {
 
     /// Brings the ball to where a touch is entered from, and touches.
     fn go_and_touch(&mut self, planned: &TouchPlan) -> Result<(TouchResult, ProbedTouch), Ending> {
-        self.out.joints = self.prober.space().may_touch(&self.rotation, planned, &self.out.joints)?;
+        self.prober.space().may_touch(&self.rotation, planned, &self.out.joints)?;
         let near = INSIDE * self.prober.params.pattern.ball_radius;
         let is_near = self.from.is_some_and(|from| (from - planned.from).norm() < near);
         // else it stays inside of the feature
