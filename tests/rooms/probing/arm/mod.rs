@@ -1,2 +1,3 @@
 mod kinematics;
 mod touching;
+mod turned_slots;

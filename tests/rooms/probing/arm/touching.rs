@@ -34,12 +34,16 @@ fn limits() -> Limits {
 }
 
 /// The tip upright at a place of O, in B.
-fn at(params: &ArmParams, place: [f64; 3]) -> Isometry3<f64> {
+pub(super) fn at(params: &ArmParams, place: [f64; 3]) -> Isometry3<f64> {
     let place = params.pose_bo * Point3::from(place);
     Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity())
 }
 
-fn touched(arm: &mut dyn Arm, touching: &TouchParams, target: &TouchTarget) -> Result<TouchRecord, ProbeError> {
+pub(super) fn touched(
+    arm: &mut dyn Arm,
+    touching: &TouchParams,
+    target: &TouchTarget,
+) -> Result<TouchRecord, ProbeError> {
     let mut onlooker = Onlooker;
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     watched.zero()?;
@@ -117,7 +121,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
 }
 
 /// Makes the touches that a search wants, until it wants no more; returns the largest force.
-fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search: &mut Explorer) -> f64 {
+pub(super) fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search: &mut Explorer) -> f64 {
     let mut onlooker = Onlooker;
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     watched.zero().unwrap();
@@ -125,9 +129,11 @@ fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchParams, search
     let (mut from, mut peak) = (None, 0.0f64);
     while let Some(planned) = search.next_touch() {
         // up where it is, over, down
+        let above = |place: &Point3<f64>| place + Vector3::z() * 6e-3;
         if let Some(out) = from {
-            watched.line("going up", &pose(&out), touching.link_speed, touching, 5.0).unwrap();
+            watched.line("going up", &pose(&above(&out)), touching.link_speed, touching, 5.0).unwrap();
         }
+        watched.line("going over", &pose(&above(&planned.entry)), touching.link_speed, touching, 1.5).unwrap();
         watched.line("going over", &pose(&planned.entry), touching.link_speed, touching, 1.5).unwrap();
         let direction = Unit::new_normalize(params.pose_bo.rotation * planned.direction.into_inner());
         let target = TouchTarget {

@@ -35,12 +35,12 @@ impl MeasuredMotion {
         let seconds = (state.stamp_ns - begun_ns) as f64 * 1e-9;
         let speed = (place - from).norm() / seconds;
         // what is no number is over every limit
-        if !(speed <= limits.speed * OVER.0 + OVER.1) {
+        if speed.is_nan() || speed > limits.speed * OVER.0 + OVER.1 {
             return Err(LimitError::Speed { mm_per_s: speed * 1e3, limit_mm_per_s: limits.speed * 1e3 });
         }
         for (joint, (now, before)) in (1..).zip(state.joints.iter().zip(joints)) {
             let turning = (now - before).abs() / seconds;
-            if !(turning <= limits.joint_speed) {
+            if turning.is_nan() || turning > limits.joint_speed {
                 let (deg_per_s, limit_deg_per_s) = (turning.to_degrees(), limits.joint_speed.to_degrees());
                 return Err(LimitError::JointSpeed { joint, deg_per_s, limit_deg_per_s });
             }

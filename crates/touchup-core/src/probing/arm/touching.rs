@@ -86,9 +86,7 @@ impl Watched<'_> {
         let mut searched = |watched: &mut Self, doing, far: f64| {
             watched.search(doing, fast, far, &mut |state| {
                 reached = line.depth(state);
-                let is_contact =
-                    line.presses(state) > params.trigger || state.wrench_b.force.norm() > ASIDE * params.trigger;
-                contacts = if is_contact { contacts + 1 } else { 0 };
+                contacts = if line.felt(state) > params.trigger { contacts + 1 } else { 0 };
                 contacts >= TRIGGERS
             })
         };
@@ -121,7 +119,7 @@ impl Watched<'_> {
                     true => line.outcome_of(&states),
                     // the first search made a contact that the second did not
                     false => {
-                        let peak_n = states.iter().map(|state| line.presses(state)).fold(0.0, f64::max);
+                        let peak_n = states.iter().map(|state| line.felt(state)).fold(0.0, f64::max);
                         TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
                     }
                 }
@@ -139,7 +137,7 @@ impl Watched<'_> {
             target: *target,
             stamps_ns: [begun, ended],
             speed: params.measure_speed,
-            curve: line.curve(&states),
+            curve: line.curve(&states, &line.contact_axis(&states)),
             curve_ns: states.first().map_or(ended, |state| state.stamp_ns),
             peak_force: self.peak_force,
             outcome,
@@ -166,7 +164,7 @@ impl Watched<'_> {
         let way_back = self.last.map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
         let mut free_at = None;
         let is_free = self.search("backing off", -slow * BACK, way_back, &mut |state| {
-            if line.presses(state) < params.trigger * FREE {
+            if line.felt(state) < params.trigger * FREE {
                 free_at.get_or_insert(line.depth(state));
             }
             free_at.is_some_and(|free_at: f64| line.depth(state) < free_at - params.back_off)
@@ -182,11 +180,10 @@ impl Watched<'_> {
         let (params, slow) = (line.params, line.along(self.slow(line)));
         states.clear();
         let stop_at = params.force - self.overshoot(params, slow.norm());
-        let is_pressed = |state: &ArmState| line.presses(state) > stop_at;
-        // a ball that slides down a rim is pushed aside more than back
+        let is_pressed = |state: &ArmState| line.felt(state) > stop_at;
         self.search("measuring", slow, room + params.force / params.stiffness * SECOND, &mut |state| {
             states.push(*state);
-            is_pressed(state) || state.wrench_b.force.norm() > ASIDE * stop_at
+            is_pressed(state)
         })?;
         let pressed = states.iter().any(is_pressed);
         self.halt("measuring", &mut |state| states.push(*state))?;
@@ -238,19 +235,38 @@ impl ApproachLine<'_> {
         -state.wrench_b.force.dot(&self.target.direction)
     }
 
-    fn curve(&self, states: &[ArmState]) -> Vec<TouchMoment> {
+    /// Force that makes a contact, N: against the approach, or aside where a wall is met at a flat angle or a rim is slid down.
+    fn felt(&self, state: &ArmState) -> f64 {
+        self.presses(state).max(state.wrench_b.force.norm() / ASIDE)
+    }
+
+    /// - `axis`: along which the force is taken, unit vector in B.
+    fn curve(&self, states: &[ArmState], axis: &Vector3<f64>) -> Vec<TouchMoment> {
         let begun = states.first().map_or(0, |state| state.stamp_ns);
         let moment = |state: &ArmState| {
-            let force = self.presses(state);
-            let lateral = (state.wrench_b.force + self.along(force)).norm();
+            let force = state.wrench_b.force.dot(axis);
+            let lateral = (state.wrench_b.force - axis * force).norm();
             TouchMoment { t: (state.stamp_ns - begun) as f64 * 1e-9, travel: self.depth(state), force, lateral }
         };
         states.iter().map(moment).collect()
     }
 
+    /// Along which the contact pushes, unit vector in B: against the approach; where a wall is met at a flat angle, along the force,
+    /// which bends at the same travel and is the larger.
+    fn contact_axis(&self, states: &[ArmState]) -> Vector3<f64> {
+        let back = -self.along(1.0);
+        let norm = |state: &ArmState| state.wrench_b.force.norm();
+        let most = states.iter().map(norm).fold(0.0, f64::max);
+        let hard: Vector3<f64> =
+            states.iter().filter(|state| norm(state) > 0.5 * most).map(|state| state.wrench_b.force).sum();
+        let pushes = hard.try_normalize(0.0).unwrap_or(back);
+        if pushes.dot(&back) * ASIDE < 1.0 { pushes } else { back }
+    }
+
     /// The outcome of a curve that reached the wanted force.
     fn outcome_of(&self, states: &[ArmState]) -> TouchOutcome {
-        let onset = match find_onset(&self.curve(states), &self.params.onset) {
+        let axis = self.contact_axis(states);
+        let onset = match find_onset(&self.curve(states, &axis), &self.params.onset) {
             Ok(onset) => onset,
             Err(error) => return TouchOutcome::Unclear(error),
         };
@@ -259,8 +275,9 @@ impl ApproachLine<'_> {
             let gone = state.pose_bt.translation.vector - self.start;
             gone - self.along(gone.dot(&self.target.direction))
         }));
-        let hard = states.iter().filter(|state| self.presses(state) - onset.bias > 0.5 * onset.peak);
-        let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), state| (sum + state.wrench_b.force, n + 1));
+        let force = |state: &ArmState| state.wrench_b.force;
+        let hard = states.iter().map(force).filter(|force| force.dot(&axis) - onset.bias > 0.5 * onset.peak);
+        let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), force| (sum + force, n + 1));
         let centre = Point3::from(self.start + self.along(onset.travel) + aside);
         TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
     }

@@ -27,6 +27,8 @@ use crate::features::{End, Feature};
 const FIRST: usize = 8;
 /// Walls that have to be touched in them.
 const LEAST_FIRST: usize = 5;
+/// A ball that slid in over a rim has no clear contact in so many directions.
+const SLID_IN: usize = 3;
 /// An end is searched for so many times at most.
 const SEARCHES: usize = 6;
 /// Places along a wall, and around an end, that are candidates.
@@ -70,6 +72,8 @@ pub(super) struct SlotPattern {
     floor: Option<End>,
     depth: f64,
     tried: usize,
+    /// contacts at unknown places among the first touches
+    unclear: usize,
     /// places of the ball's centre at the end of searches without contact: where it fell in, and along the slot; m in O
     free: Vec<Point3<f64>>,
     /// where the ball lay when it did not fall in, m in O
@@ -172,13 +176,17 @@ impl SlotPattern {
     }
 
     fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
-        if self.measuring.observations.is_empty() && touch.result == TouchResult::Unclear {
-            self.opening.slid_in(self.middle, context);
-            self.phase = SlotPhase::Opening;
-            return;
-        }
         self.take_wall(touch);
         self.tried += 1;
+        if touch.result == TouchResult::Unclear {
+            self.unclear += 1;
+        }
+        // one unclear touch may have been anything
+        if self.measuring.observations.is_empty() && self.unclear >= SLID_IN {
+            self.opening.slid_in(self.middle, context);
+            (self.phase, self.tried, self.unclear) = (SlotPhase::Opening, 0, 0);
+            return;
+        }
         if self.tried < FIRST {
             return;
         }

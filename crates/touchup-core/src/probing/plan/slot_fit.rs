@@ -24,6 +24,8 @@ const ANGLES: usize = 24;
 const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
 /// Places that are free may be this much beyond it, m.
 const BESIDE: f64 = 0.2e-3;
+/// Fits whose residuals are below this, rms, agree with the points: noise of a touch, and its sliding at a flat angle, m.
+const AGREES: f64 = 20e-6;
 /// Where along it the place is that the ball fell in, over its half length.
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
 /// All of its steps are made: no touch says how near is near enough.
@@ -85,7 +87,8 @@ impl SlotFit {
         SEARCH.run((self, self.rms(points)), equations, damped, better, |_, _| false).0
     }
 
-    /// The best one through points around a place, in any direction, among those with the free places inside.
+    /// The best one through points around a place, in any direction, among those with the free places inside. Where no point is at an
+    /// end many lengths agree: then the shortest of them, whose ends lie no farther than what was touched.
     pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>) -> Option<Self> {
         let distance = |p: &Point2<f64>| (p - place).norm();
         let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
@@ -99,8 +102,10 @@ impl SlotFit {
         let sized = angles.flat_map(|angle| HALVES.map(|half| (angle, half * far)));
         let guesses = sized.flat_map(|(angle, half)| SHIFTS.map(|shift| guess(angle, half, shift)));
         let beside = |fit: &Self| free.iter().filter(|p| fit.residual(p).0 > BESIDE).count();
-        let fits = guesses.map(|guess| guess.fitted(points)).map(|fit| (beside(&fit), fit.rms(points), fit));
-        fits.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(.., fit)| fit)
+        let fits = guesses.map(|guess| guess.fitted(points));
+        let fits = fits.map(|fit| (beside(&fit), fit.rms(points).max(AGREES), fit));
+        let shorter = |a: &Self, b: &Self| a.half.total_cmp(&b.half);
+        fits.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(shorter(&a.2, &b.2))).map(|(.., fit)| fit)
     }
 
     /// The same, with its direction as that of another rather than against it.
@@ -129,6 +134,17 @@ mod tests {
         assert!((found.middle - middle).norm() < 1e-8, "{found:?}");
         assert!((found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8, "{found:?}");
         assert!((found.along().perp(&Vector2::new(0.7f64.cos(), 0.7f64.sin()))).abs() < 1e-6, "{found:?}");
+    }
+
+    /// Touched on its straight walls alone, a slot may have any length from that of what was touched on: no more is believed.
+    #[test]
+    fn a_slot_with_open_ends_is_no_longer_than_what_was_touched() {
+        let walls =
+            [[-4.0, 1.5], [-1.0, 1.5], [0.5, 1.5], [3.0, 1.5], [-3.0, -1.5], [-0.5, -1.5], [1.0, -1.5], [4.5, -1.5]];
+        let points = walls.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
+        let found = SlotFit::through(&points, &[], &Point2::origin()).unwrap();
+        assert!(found.along().y.abs() < 0.02 && (found.radius - 1.5e-3).abs() < 0.05e-3, "{found:?}");
+        assert!(found.half > 3.5e-3 && found.half < 7e-3, "{found:?}");
     }
 
     /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; where the ball moved freely determines it.
