@@ -140,7 +140,7 @@ impl fmt::Display for ProbingSummary {
             record.feature.iter().try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
             let touches = counted(*touches, "touch", "touches");
             write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
-            record.rejected_touches.iter().try_for_each(|touch| write!(f, "\n  {touch}"))?;
+            by_reason(&record.rejected_touches).iter().try_for_each(|line| write!(f, "\n  {line}"))?;
             record.slides.iter().try_for_each(|slide| write!(f, "\n  {slide}"))?;
             writeln!(f)?;
         }
@@ -148,10 +148,29 @@ impl fmt::Display for ProbingSummary {
     }
 }
 
-impl fmt::Display for RejectedTouch {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "touch {} does not count: {}", self.index, self.reason)
+/// The touches that do not count, a line for each reason.
+fn by_reason(rejected: &[RejectedTouch]) -> Vec<String> {
+    let mut groups: Vec<(&str, Vec<usize>)> = Vec::new();
+    for RejectedTouch { index, reason } in rejected {
+        match groups.iter_mut().find(|(known, _)| known == reason) {
+            Some((_, indices)) => indices.push(*index),
+            None => groups.push((reason, vec![*index])),
+        }
     }
+    let line = |(reason, indices): (&str, Vec<usize>)| match indices[..] {
+        [index] => format!("touch {index} does not count: {reason}"),
+        _ => format!("touches {} do not count: {reason}", in_ranges(&indices)),
+    };
+    groups.into_iter().map(line).collect()
+}
+
+/// Growing numbers in words, with a range for each run of more than two: `0, 1, 4 to 9`.
+fn in_ranges(numbers: &[usize]) -> String {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b).flat_map(|run| match run {
+        [first, _, .., last] => vec![format!("{first} to {last}")],
+        few => few.iter().map(usize::to_string).collect(),
+    });
+    runs.collect::<Vec<_>>().join(", ")
 }
 
 impl fmt::Display for SlideRecordOfFile {
@@ -186,4 +205,21 @@ fn numbers(feature: &FeatureRecord) -> String {
         with("depth ", feature.depth_mm, "depth_mm"),
     ];
     format!("{} mm", all.into_iter().flatten().collect::<Vec<_>>().join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn touches_with_the_same_reason_are_one_line() {
+        let touch = |(index, reason): (usize, &str)| RejectedTouch { index, reason: reason.to_owned() };
+        let rejected =
+            [(0, "far"), (1, "an impact"), (2, "far"), (3, "far"), (5, "far"), (6, "far"), (7, "far"), (9, "far")];
+        assert_eq!(
+            by_reason(&rejected.map(touch)),
+            ["touches 0, 2, 3, 5 to 7, 9 do not count: far", "touch 1 does not count: an impact"]
+        );
+        assert!(by_reason(&[]).is_empty());
+    }
 }
