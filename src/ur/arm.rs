@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use super::client::Client;
 use super::dashboard::Dashboard;
 use super::error::UrError;
+use super::freshness::Freshness;
 use super::guard::Halt;
 use super::params::UrParams;
 use super::probe::probe;
@@ -39,6 +40,7 @@ pub struct UrArm {
     params: UrParams,
     client: Client,
     last: UrState,
+    freshness: Freshness,
 }
 
 impl UrArm {
@@ -58,7 +60,7 @@ impl UrArm {
         }
         let client = Client::start(params, dashboard)?;
         let last = client.next_state(params.deadlines.connect).map_err(|error| UrError::Client(error.to_string()))?;
-        Ok(Self { params: params.clone(), client, last })
+        Ok(Self { params: params.clone(), client, last, freshness: Freshness::default() })
     }
 
     /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing moves.
@@ -187,7 +189,12 @@ impl Arm for UrArm {
             return Err(ArmError::Stopped { safety });
         }
         let order = self.order(command)?;
-        self.client.order(order).map(drop)
+        let is_stop = matches!(command, Command::Stop { .. });
+        // a stop is right whenever it comes
+        if is_stop || self.freshness.may_send(self.last.stamp_s, self.client.newest_s())? {
+            self.client.order(order)?;
+        }
+        Ok(())
     }
 
     fn zero_sensor(&mut self) -> Result<(), ArmError> {

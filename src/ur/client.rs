@@ -117,6 +117,11 @@ impl Client {
         known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
     }
 
+    /// Stamp of the newest state that has come, also where it was not given yet, s.
+    pub fn newest_s(&self) -> f64 {
+        self.shared.known().newest_s
+    }
+
     /// Throws away the states that wait.
     pub fn forget_states(&self) {
         self.shared.known().states.clear();

@@ -43,6 +43,8 @@ pub(super) struct GuardState {
     pub deadlines: Deadlines,
     pub is_ready: bool,
     pub states: VecDeque<UrState>,
+    /// of the newest state that has come, s
+    pub newest_s: f64,
     pub done: u64,
     pub sent: u64,
     pub served: u64,
@@ -113,6 +115,7 @@ impl GuardState {
             deadlines,
             is_ready: false,
             states: VecDeque::new(),
+            newest_s: f64::NAN,
             done: 0,
             sent: 0,
             served: 0,
@@ -193,7 +196,7 @@ impl GuardState {
                 self.states.clear();
             }
             ClientReport::State(state) => {
-                self.fresh_at = Some(now);
+                (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
                 // where the safety system has ended it, the state says so by itself
                 let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
                 self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));

@@ -11,6 +11,7 @@ pub(crate) mod child;
 mod client;
 mod dashboard;
 mod error;
+mod freshness;
 mod guard;
 mod obedience;
 mod params;

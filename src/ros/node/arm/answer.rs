@@ -166,7 +166,7 @@ fn stopped(error: &ProbeError) -> u8 {
             ArmError::Lost { .. } | ArmError::Dropped { .. } | ArmError::ProgramEnded => ProbeResult::LINK_LOST,
             // most often a door
             ArmError::ProgramPaused => ProbeResult::OPERATOR_STOP,
-            ArmError::Stale | ArmError::WentBack { .. } => ProbeResult::DATA_LOST,
+            ArmError::Stale | ArmError::WentBack { .. } | ArmError::Behind { .. } => ProbeResult::DATA_LOST,
             ArmError::Stopped { safety: Safety::OperatorStop } => ProbeResult::OPERATOR_STOP,
             ArmError::Stopped { .. } => ProbeResult::PROTECTIVE_STOP,
             ArmError::Client { .. } | ArmError::Disobeys { .. } => ProbeResult::DRIVER_LOST,

@@ -104,6 +104,14 @@ pub enum ArmError {
         /// ms
         back_ms: f64,
     },
+    /// Who commands it is slower than its states.
+    #[error(
+        "touchup is {age_ms:.0} ms behind the states of the arm and does not catch up, so the arm was left to brake: end what else runs on this machine"
+    )]
+    Behind {
+        /// of the state that the last order would have followed, ms
+        age_ms: f64,
+    },
     /// It is not allowed to move.
     #[error("the arm is stopped: {safety}")]
     Stopped {

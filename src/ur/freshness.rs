@@ -1,0 +1,96 @@
+//! Whether an order follows the newest state of the arm.
+//!
+//! A caller that was held up finds states that waited. What it orders by them would follow a place and a force of the past: such an order
+//! is not sent, and where none is sent the child brakes. Once the caller has taken what waited its orders go out again.
+
+use crate::probing::arm::ArmError;
+
+/// The state that an order follows may be so much older than the newest, s: two periods of the arm, and the rounding of stamps.
+const OLD: f64 = 2.0 * 2e-3 + 0.5e-3;
+/// A caller that does not catch up within this time is too slow for the arm, s.
+const CATCHES_UP: f64 = 0.2;
+
+/// How long a caller has been behind the arm.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Freshness {
+    /// stamp of the newest state at the first order that was not sent, s
+    behind_since_s: Option<f64>,
+}
+
+impl Freshness {
+    /// Whether an order may go out.
+    ///
+    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come, s.
+    ///
+    /// # Errors
+    /// [`ArmError::Behind`] for a caller that does not catch up.
+    pub fn may_send(&mut self, followed_s: f64, newest_s: f64) -> Result<bool, ArmError> {
+        let age = newest_s - followed_s;
+        if age.is_nan() || age <= OLD {
+            self.behind_since_s = None;
+            return Ok(true);
+        }
+        let since = *self.behind_since_s.get_or_insert(newest_s);
+        if newest_s - since > CATCHES_UP {
+            self.behind_since_s = None;
+            return Err(ArmError::Behind { age_ms: age * 1e3 });
+        }
+        Ok(false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The orders of a caller that takes one state each so many ms from an arm that makes one each 2 ms; it was held up for so long, ms,
+    /// at the beginning. Of each order: when, ms, whether it went out.
+    fn orders(held_ms: u64, cycle_us: u64) -> (Vec<(f64, bool)>, Option<ArmError>) {
+        let (mut freshness, mut orders, mut followed_s) = (Freshness::default(), Vec::new(), 0.0);
+        let mut now_us = held_ms * 1000;
+        while now_us < 1_000_000 {
+            let newest_s = (now_us / 2000) as f64 * 2e-3;
+            // with none that waits it waits for the next
+            followed_s = f64::min(followed_s + 2e-3, newest_s.max(followed_s));
+            match freshness.may_send(followed_s, newest_s) {
+                Ok(went) => orders.push((now_us as f64 * 1e-3, went)),
+                Err(error) => return (orders, Some(error)),
+            }
+            now_us += cycle_us;
+        }
+        (orders, None)
+    }
+
+    #[test]
+    fn a_caller_that_keeps_up_is_never_held_back() {
+        let (orders, error) = orders(0, 2000);
+        assert!(error.is_none() && orders.len() == 500 && orders.iter().all(|(_, went)| *went));
+    }
+
+    /// 50 ms are 25 states; at a tenth of a millisecond for each they are taken within 2.5 ms, in which one more comes.
+    #[test]
+    fn a_caller_that_was_held_for_50_ms_orders_nothing_until_it_has_caught_up() {
+        let (orders, error) = orders(50, 100);
+        assert_eq!(error, None);
+        let first = orders.iter().find(|(_, went)| *went).unwrap().0;
+        assert!((52.0..54.0).contains(&first), "{first} ms");
+        assert!(orders.iter().skip_while(|(_, went)| !went).all(|(_, went)| *went));
+    }
+
+    /// Each 3 ms one state of 2 ms is taken: 4 ms behind after some 15 ms, and never again nearer.
+    #[test]
+    fn a_caller_that_is_slower_than_the_arm_orders_nothing_more_and_is_named() {
+        let (orders, error) = orders(0, 3000);
+        let last = orders.iter().rposition(|(_, went)| *went).unwrap();
+        assert!(orders[last].0 < 30.0 && orders.len() - last > 50, "{:?}", orders[last]);
+        let error = error.unwrap();
+        assert!(matches!(error, ArmError::Behind { age_ms } if age_ms > 50.0), "{error}");
+    }
+
+    #[test]
+    fn a_stamp_that_goes_back_holds_nothing_back() {
+        let mut freshness = Freshness::default();
+        assert_eq!(freshness.may_send(10.0, 3.0), Ok(true));
+        assert_eq!(freshness.may_send(f64::NAN, 3.0), Ok(true));
+    }
+}
