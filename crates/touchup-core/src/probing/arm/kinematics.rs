@@ -82,7 +82,7 @@ impl UrGeometry {
         d5: 0.11985,
         d6: 0.11655,
         upper_arm_beside: 0.176,
-        forearm_beside: 0.049,
+        forearm_beside: 0.039,
         radii: [0.095, 0.080, 0.070, 0.060],
     };
 
