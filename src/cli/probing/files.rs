@@ -9,7 +9,7 @@ use crate::io::probed_touches_file::TouchLog;
 use crate::io::recording::{SegmentedWriter, Topics};
 use crate::probing::arm::ArmState;
 use crate::probing::execute::ProbedTouch;
-use crate::stylus::{Message, StampedPose, StampedWrench, Wrench};
+use crate::stylus::Message;
 
 /// The touches, a line each.
 pub(super) const TOUCHES: &str = "probed_touches.jsonl";
@@ -81,10 +81,8 @@ impl ProbeFiles {
             return Ok(None);
         }
         self.last_ns = Some(stamp_ns);
-        let turned = |v| state.pose_bt.rotation.inverse() * v;
-        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
-        let pose = Message::Pose(StampedPose { stamp_ns, pose_ot: state.pose_bt });
-        let wrench = Message::Wrench(StampedWrench { stamp_ns, wrench });
+        let (pose, wrench) = state.as_probe(stamp_ns);
+        let (pose, wrench) = (Message::Pose(pose), Message::Wrench(wrench));
         self.recording.write(&pose, BASE_FRAME).map_err(CliError::not_written)?;
         self.recording.write(&wrench, PROBE_FRAME).map_err(CliError::not_written)?;
         if stamp_ns.saturating_sub(self.flushed_ns) > FLUSH_EVERY_NS {

@@ -3,6 +3,7 @@
 
 mod files;
 mod folder;
+mod follower;
 mod picture;
 mod ready;
 mod report;

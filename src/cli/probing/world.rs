@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3};
 
 use super::files::ProbeFiles;
+use super::follower::{Follower, QUEUE, TakeStates};
 use super::ready::Ready;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::cli::signals::StopSignals;
@@ -59,12 +60,28 @@ impl FollowingMesh {
     }
 }
 
-/// Takes each state of the arm for a sample, and writes it.
-pub(super) struct LiveWorld<'a> {
+/// The files of a probing, and the mesh: each state of the arm is a sample of both.
+struct Followed {
     mesh: FollowingMesh,
     files: ProbeFiles,
-    signals: &'a StopSignals,
     failed: Option<CliError>,
+}
+
+impl TakeStates for Followed {
+    fn take_state(&mut self, state: &ArmState) -> bool {
+        match self.files.record(state) {
+            Ok(messages) => messages.iter().flatten().for_each(|message| self.mesh.take(message)),
+            Err(error) => self.failed = Some(error),
+        }
+        self.failed.is_none() && self.mesh.failed.is_none()
+    }
+}
+
+/// What is around an arm that probes features. Files and mesh follow its states beside the loop; between its motions it waits for
+/// them.
+pub(super) struct LiveWorld<'a> {
+    followed: Follower<Followed>,
+    signals: &'a StopSignals,
     bar: Bar,
 }
 
@@ -82,15 +99,23 @@ impl<'a> LiveWorld<'a> {
             true => ProbeFiles::resume(out, ball_radius, &mut |message| mesh.take(message))?,
             false => ProbeFiles::begin(out, ball_radius)?,
         };
-        Ok(Self { mesh, files, signals, failed: None, bar: Bar::new("probe", None) })
+        let followed = Follower::new(Followed { mesh, files, failed: None }, is_simulated);
+        let no_thread = |error| CliError::arm(format_args!("no thread for files and mesh can be had: {error}"));
+        Ok(Self { followed: followed.map_err(no_thread)?, signals, bar: Bar::new("probe", None) })
     }
 
     /// Ends the recording; returns how many touches were written.
     pub fn finish(self) -> Result<usize, CliError> {
-        let written = self.files.finish();
-        match (self.failed, self.mesh.failed) {
+        let is_behind = self.followed.is_behind();
+        let Followed { mesh, files, failed } = self.followed.into_inner();
+        let written = files.finish();
+        match (failed, mesh.failed) {
             (Some(error), _) => Err(error),
             (None, Some(error)) => Err(error.into()),
+            (None, None) if is_behind => Err(CliError::arm(format_args!(
+                "files and mesh were {QUEUE} states behind the arm, so it was stopped: end what else runs on this machine, or \
+                 write to a faster disk"
+            ))),
             (None, None) => written,
         }
     }
@@ -99,25 +124,21 @@ impl<'a> LiveWorld<'a> {
 impl Observer for LiveWorld<'_> {
     fn on_state(&mut self, state: &ArmState) {
         self.bar.step();
-        match self.files.record(state) {
-            Ok(messages) => messages.iter().flatten().for_each(|message| self.mesh.take(message)),
-            Err(error) => self.failed = Some(error),
-        }
+        self.followed.on_state(state);
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        let has_failed = self.failed.is_some() || self.mesh.failed.is_some();
-        self.signals.request().max(has_failed.then_some(StopRequest::Retract))
+        self.signals.request().max(self.followed.has_failed().then_some(StopRequest::Retract))
     }
 }
 
 impl World for LiveWorld<'_> {
     fn mesh(&self) -> &TriMesh {
-        self.mesh.engine.refiner().mesh()
+        self.followed.get().mesh.engine.refiner().mesh()
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.mesh.engine.refiner().closest_face(place, reach)
+        self.followed.get().mesh.engine.refiner().closest_face(place, reach)
     }
 
     fn publish(&mut self, progress: &Progress) {
@@ -132,8 +153,9 @@ impl World for LiveWorld<'_> {
     }
 
     fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
-        if let Err(error) = self.files.touched(flag, touch) {
-            self.failed = Some(error);
+        let followed = self.followed.get_mut();
+        if let Err(error) = followed.files.touched(flag, touch) {
+            followed.failed = Some(error);
         }
     }
 }

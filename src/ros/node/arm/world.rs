@@ -18,7 +18,6 @@ use crate::ros::node::setup::Setup;
 use crate::ros::node::side_work::begin;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::ros::stop::Motion;
-use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
 /// Feedback comes at least so often while the arm moves.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
@@ -66,10 +65,9 @@ impl ArmLink {
         // the base of the arm, where the scene says where the scan lies in it
         let base = if scene.scan_to_space.is_some() { CELL } else { &shared.frame };
         let stamp_ns = state.stamp_ns + self.offset_ns.unwrap_or(0);
-        let turned = |v| state.pose_bt.rotation.inverse() * v;
-        let wrench = Wrench { force: turned(state.wrench_b.force), torque: turned(state.wrench_b.torque) };
-        self.samples.publish_pose(as_pose(&StampedPose { stamp_ns, pose_ot: state.pose_bt }, base));
-        self.samples.publish_wrench(as_wrench(&StampedWrench { stamp_ns, wrench }, tool));
+        let (pose, wrench) = state.as_probe(stamp_ns);
+        self.samples.publish_pose(as_pose(&pose, base));
+        self.samples.publish_wrench(as_wrench(&wrench, tool));
     }
 }
 

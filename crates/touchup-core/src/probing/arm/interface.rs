@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::kinematics::Joints;
-use crate::stylus::Wrench;
+use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
 /// What an arm says of itself at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,17 @@ pub struct ArmState {
     pub joints: Joints,
     /// whether and why it is stopped
     pub safety: Safety,
+}
+
+impl ArmState {
+    /// What a probe measures at this moment: its pose in B, and the wrench in its own axes, as its sensor would have it.
+    ///
+    /// - `stamp_ns`: of both.
+    pub fn as_probe(&self, stamp_ns: i64) -> (StampedPose, StampedWrench) {
+        let turned = |v| self.pose_bt.rotation.inverse() * v;
+        let wrench = Wrench { force: turned(self.wrench_b.force), torque: turned(self.wrench_b.torque) };
+        (StampedPose { stamp_ns, pose_ot: self.pose_bt }, StampedWrench { stamp_ns, wrench })
+    }
 }
 
 /// What the safety system of an arm says.
@@ -186,4 +197,29 @@ pub trait Arm {
 
     /// Time between two states, s.
     fn period(&self) -> f64;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    /// Turned by a quarter about z, x of the base is −y of the probe.
+    #[test]
+    fn a_wrench_in_the_base_is_felt_in_the_axes_of_the_probe() {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        let wrench_b = Wrench { force: Vector3::new(2.0, 0.0, 1.0), torque: Vector3::new(0.0, 0.3, 0.0) };
+        let state = ArmState {
+            stamp_ns: 4,
+            pose_bt: Isometry3::from_parts(Vector3::new(0.4, 0.1, 0.2).into(), turn),
+            wrench_b,
+            raw_wrench_f: wrench_b,
+            joints: [0.0; 6],
+            safety: Safety::Normal,
+        };
+        let (pose, wrench) = state.as_probe(9);
+        assert_eq!((pose.stamp_ns, pose.pose_ot, wrench.stamp_ns), (9, state.pose_bt, 9));
+        assert!((wrench.wrench.force - Vector3::new(0.0, -2.0, 1.0)).norm() < 1e-15, "{:?}", wrench.wrench);
+        assert!((wrench.wrench.torque - Vector3::new(0.3, 0.0, 0.0)).norm() < 1e-15, "{:?}", wrench.wrench);
+    }
 }
