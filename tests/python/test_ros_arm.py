@@ -48,7 +48,7 @@ from running import Running
 
 HOLE, SLOT = 1, 2
 # of ProbeResult
-REACHED, CANCELLED, NO_SUCH_FEATURE, BUSY = 1, 6, 22, 24
+REACHED, CANCELLED, NO_SUCH_FEATURE, BUSY, NOT_READY, STOPPED_IN_PLACE = 1, 6, 22, 24, 25, 50
 # of the plate of the demo, mm: centre of the through hole in its top, and its diameter; the blind one
 THROUGH, BLIND = ((16.0, 36.0, 12.0), 8.0), ((32.0, 34.0, 12.0), 6.0)
 CONFIGURED = ProbeSettings(0, 0.0, 0.0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
@@ -266,6 +266,17 @@ def test_flagged_holes_are_probed_by_service_and_action(cell):
     cell.wait_for(is_shown)
 
 
+def has_touched(cell, feedback, least):
+    """Waits until a goal has come to its so many-th touch."""
+    messages = []
+
+    def has_come():
+        messages.extend(feedback.take(100))
+        return any(message.touch >= least for message in messages)
+
+    cell.wait_for(has_come)
+
+
 def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
     (x, y, z), _ = THROUGH
     through, blind = cell.flag(HOLE, (x + 0.5, y, z)), cell.flag(HOLE, (32.0, 33.0, 12.0))
@@ -275,13 +286,7 @@ def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
     # until both sides know each other
     assert cell.probe(999).code == NO_SUCH_FEATURE
     assert cell.send_goal(name, [through, blind])
-    messages = []
-
-    def has_begun():
-        messages.extend(feedback.take(100))
-        return any(message.touch >= 3 for message in messages)
-
-    cell.wait_for(has_begun)
+    has_touched(cell, feedback, 3)
     assert cell.probe(blind).code == BUSY
     assert "works at an order" in cell.trigger("arm_state").message
     assert cell.cancel(name) == 0
@@ -289,3 +294,23 @@ def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
     assert (response.status, response.code, response.ids) == (5, CANCELLED, [through]), response.message
     assert cell.trigger("arm_state").success
     assert_is(cell.probe(through), THROUGH)
+
+
+def test_a_stopped_arm_stays_and_takes_nothing_up_until_it_is_recovered(cell):
+    (x, y, z), _ = THROUGH
+    through = cell.flag(HOLE, (x + 0.5, y, z))
+    feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
+    # both sides know each other before anything moves: recovering an arm that nothing stopped changes nothing
+    assert cell.trigger("recover").success
+    name = [60] * 16
+    assert cell.send_goal(name, [through])
+    has_touched(cell, feedback, 3)
+    stopped = cell.trigger("stop")
+    assert stopped.success, stopped.message
+    response = cell.result(name)
+    assert (response.code, response.ids) == (STOPPED_IN_PLACE, [through]), response.message
+    assert "~/stop was called" in response.message, response.message
+    assert not cell.trigger("arm_state").success
+    assert cell.probe(through).code == NOT_READY
+    assert cell.trigger("recover").success
+    assert cell.trigger("arm_state").success
