@@ -117,6 +117,15 @@ pub(super) struct TouchesOutput {
     pub touches_out: Option<PathBuf>,
 }
 
+/// The file in which what an arm measures is kept as it is measured, if any.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum KeptMeasurements<'a> {
+    /// a line of JSON for each touch
+    Touches(Option<&'a Path>),
+    /// a line of CSV for each static segment
+    Segments(Option<&'a Path>),
+}
+
 /// True payload of a simulated arm, where it differs from the scene.
 #[derive(Debug, Args)]
 #[group(id = "true_payload")]
@@ -177,14 +186,14 @@ impl CellArguments {
     /// Measures something with the probe of an arm about the scan as it is, until a signal stops it; returns also the cell.
     ///
     /// - `stage`: what this is called while it lasts.
-    /// - `touches`: where each touch is written as it is made.
+    /// - `kept`: what is measured, and where each of it is written as it is measured.
     /// - `truth`: as in [`Self::with`].
     pub fn measure<T, E: Into<CliError>>(
         &self,
         robot: RobotName,
         scene: &Path,
         stage: &'static str,
-        touches: Option<&Path>,
+        kept: KeptMeasurements<'_>,
         truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
     ) -> Result<(T, Cell), CliError> {
@@ -195,7 +204,7 @@ impl CellArguments {
         let truth = |arm| truth(arm, &ready.scene);
         let signals = StopSignals::listen()?;
         let measured = self.with(robot, &ready, truth, |arm| {
-            let mut world = SpotWorld::new(&ready, touches, &signals)?;
+            let mut world = SpotWorld::new(&ready, kept, &signals)?;
             let measured = work(&mut Prober::new(arm, &ready.cell, &ready.params, &mut world));
             signals.arm_is_at_rest();
             world.finish(measured.map_err(Into::into))

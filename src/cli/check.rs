@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arm::{ArmArguments, TouchesOutput};
+use super::arm::{ArmArguments, KeptMeasurements, TouchesOutput};
 use super::probing::millimetres;
 use super::{CliError, Losses, print_report, reported, require, require_positive};
 use crate::probing::execute::{Repeatability, SpotTouch};
@@ -64,7 +64,7 @@ pub(super) fn repeated(
     let (least, most) = (TOUCHES.start(), TOUCHES.end());
     require(TOUCHES.contains(&touches), format!("--touches {touches} must be {least} to {most}"))?;
     let ArmArguments { robot, cell } = arm;
-    let out = output.touches_out.as_deref();
+    let out = KeptMeasurements::Touches(output.touches_out.as_deref());
     let found = cell.measure(*robot, scene, "touch", out, |arm, _| Ok(arm), |prober| prober.repeat(&place, touches))?;
     Ok(found.0)
 }

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use tracing::warn;
 
-use super::super::arm::{CellArguments, RobotName, TruePayload};
+use super::super::arm::{CellArguments, KeptMeasurements, RobotName, TruePayload};
 use super::super::{CliError, Losses, reported, require};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, DraftScene, Vector, rounded};
 use crate::calibrate::{
@@ -39,6 +39,10 @@ pub(in crate::cli) struct PayloadArguments {
     cell: CellArguments,
     #[command(flatten)]
     truth_payload: TruePayload,
+    /// Output, with --robot: each static segment as it is measured, a line of CSV each as --samples reads them, so that none is lost
+    /// whatever ends the measurement
+    #[arg(long, value_name = "CSV", requires = "robot")]
+    segments_out: Option<PathBuf>,
     /// Axes of the wrench; default: those of the recording, or the sensor's for --samples
     #[arg(long, value_name = "AXES", conflicts_with = "robot")]
     wrench_axes: Option<Axes>,
@@ -83,11 +87,12 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
 
 /// - `gravity`: m/s².
 fn payload_of_arm(arguments: &PayloadArguments, robot: RobotName, gravity: f64) -> Result<Losses, CliError> {
-    let PayloadArguments { cell, truth_payload, target, .. } = arguments;
+    let PayloadArguments { cell, truth_payload, target, segments_out, .. } = arguments;
+    let kept = KeptMeasurements::Segments(segments_out.as_deref());
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
     let stage = "identify the payload";
-    let (readings, _) = cell.measure(robot, scene, stage, None, truth, |prober| prober.measure_payload())?;
+    let (readings, _) = cell.measure(robot, scene, stage, kept, truth, |prober| prober.measure_payload())?;
     let PayloadReadings { segments, not_reached } = readings;
     let params = PayloadParams { gravity, ..PayloadParams::default() };
     let fit = fit_payload(&segments, &params).map_err(|error| CliError::arm(advice(&error)))?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::{Point3, Vector3};
 
-use super::super::arm::{CellArguments, RobotName, TouchesOutput};
+use super::super::arm::{CellArguments, KeptMeasurements, RobotName, TouchesOutput};
 use super::super::probing::millimetres;
 use super::super::{CliError, Losses, reported};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
@@ -89,7 +89,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
 /// - `spot`: as it was written, X,Y,Z in mm.
 fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
     let TipArguments { cell, truth_tip_mm, output, target, .. } = arguments;
-    let out = output.touches_out.as_deref();
+    let out = KeptMeasurements::Touches(output.touches_out.as_deref());
     let place = Point3::from(millimetres("--spot", spot)?);
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, _: &Scene| {

@@ -8,10 +8,13 @@ use nalgebra::{Isometry3, Point3};
 use super::files::ProbeFiles;
 use super::follower::{Follower, QUEUE, TakeStates};
 use super::ready::Ready;
+use crate::calibrate::StaticPose;
+use crate::cli::arm::KeptMeasurements;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::cli::signals::StopSignals;
 use crate::cli::{CliError, not_written, print_result};
 use crate::io::probed_touches_file::{TouchLine, TouchLog};
+use crate::io::static_poses::{StaticPoseLog, static_pose_line};
 use crate::live::{Engine, Gate, LiveError, Pace, Renewal};
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer, StopRequest};
@@ -164,34 +167,68 @@ impl World for LiveWorld<'_> {
 pub(in crate::cli) struct SpotWorld<'a> {
     scan: StaticWorld,
     signals: &'a StopSignals,
-    touches: Option<TouchLog>,
-    /// in words, curves left out
+    log: MeasurementLog,
+    /// lines of what was measured, in their order; curves left out
     made: Vec<String>,
     /// m
     ball_radius: f64,
     failed: Option<CliError>,
 }
 
-impl<'a> SpotWorld<'a> {
-    /// - `touches`: where each touch is written as it is made.
-    pub fn new(ready: &Ready, touches: Option<&Path>, signals: &'a StopSignals) -> Result<Self, CliError> {
-        let ball_radius = ready.params.pattern.ball_radius;
-        let create = |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
-        let touches = touches.map(create).transpose()?;
-        Ok(Self { scan: ready.static_world(), signals, touches, made: Vec::new(), ball_radius, failed: None })
+/// What is measured, and the file in which it is kept, if any.
+enum MeasurementLog {
+    Touches(Option<TouchLog>),
+    Segments(Option<StaticPoseLog>),
+}
+
+impl MeasurementLog {
+    fn create(kept: KeptMeasurements, ball_radius: f64) -> Result<Self, CliError> {
+        Ok(match kept {
+            KeptMeasurements::Touches(path) => {
+                let create = |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
+                Self::Touches(path.map(create).transpose()?)
+            }
+            KeptMeasurements::Segments(path) => {
+                let create = |path: &Path| StaticPoseLog::create(path).map_err(not_written(path));
+                Self::Segments(path.map(create).transpose()?)
+            }
+        })
     }
 
-    /// What was measured; where that was broken off the touches until then are printed, unless a file has them.
+    fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Touches(log) => log.as_ref().map(TouchLog::path),
+            Self::Segments(log) => log.as_ref().map(StaticPoseLog::path),
+        }
+    }
+
+    /// What it keeps, and the flag that names a file for that.
+    fn names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Touches(_) => ["touches", "--touches-out"],
+            Self::Segments(_) => ["static segments", "--segments-out"],
+        }
+    }
+}
+
+impl<'a> SpotWorld<'a> {
+    /// - `kept`: what is measured, and where each of it is written as it is measured.
+    pub fn new(ready: &Ready, kept: KeptMeasurements, signals: &'a StopSignals) -> Result<Self, CliError> {
+        let ball_radius = ready.params.pattern.ball_radius;
+        let log = MeasurementLog::create(kept, ball_radius)?;
+        Ok(Self { scan: ready.static_world(), signals, log, made: Vec::new(), ball_radius, failed: None })
+    }
+
+    /// What was measured; where that was broken off what was measured until then is printed, unless a file has it.
     pub fn finish<T>(self, measured: Result<T, CliError>) -> Result<T, CliError> {
         let measured = self.failed.map_or(measured, Err);
-        measured.map_err(|error| match (self.made.len(), self.touches) {
+        let [what, flag] = self.log.names();
+        measured.map_err(|error| match (self.made.len(), self.log.path()) {
             (0, _) => error,
-            (count, Some(touches)) => {
-                error.with(format_args!("the touches ({count}) are in {}", touches.path().display()))
-            }
+            (count, Some(path)) => error.with(format_args!("the {what} ({count}) are in {}", path.display())),
             (count, None) => {
                 print_result(&self.made.join("\n"));
-                error.with(format_args!("the touches ({count}) are printed; --touches-out keeps all of them"))
+                error.with(format_args!("the {what} ({count}) are printed; {flag} keeps all of them"))
             }
         })
     }
@@ -218,10 +255,18 @@ impl World for SpotWorld<'_> {
 
     fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
         self.made.push(TouchLine::of(flag, self.made.len(), touch, self.ball_radius, 0).to_string());
-        let Some(touches) = &mut self.touches else { return };
+        let MeasurementLog::Touches(Some(log)) = &mut self.log else { return };
         // no recording has another clock
-        if let Err(error) = touches.append(flag, touch, 0) {
-            self.failed = Some(not_written(touches.path())(error));
+        if let Err(error) = log.append(flag, touch, 0) {
+            self.failed = Some(not_written(log.path())(error));
+        }
+    }
+
+    fn weighed(&mut self, segment: &StaticPose) {
+        self.made.push(static_pose_line(&segment.r_wt, &segment.wrench));
+        let MeasurementLog::Segments(Some(log)) = &mut self.log else { return };
+        if let Err(error) = log.append(&segment.r_wt, &segment.wrench) {
+            self.failed = Some(not_written(log.path())(error));
         }
     }
 }

@@ -10,6 +10,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 use touchup::io::probed_touches_file::{TouchLine, read_probed_touches};
 use touchup::io::recording::{RecordingReader, Topics};
+use touchup::io::static_poses::read_static_poses;
 use touchup::stylus::Message;
 
 use super::command::cell;
@@ -249,4 +250,42 @@ fn a_check_that_is_interrupted_keeps_its_touches() {
     let words =
         format!("interrupted: the arm stopped and retracted; the touches ({}) are in {}", made.len(), path.display());
     assert!(stderr.contains(&words), "{stderr}");
+}
+
+#[test]
+fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
+    let case = Case::new();
+    let ([scene, truth], path) = (&case.files, case.path("segments.csv"));
+    let out = case.path("weighed.yaml");
+    let identify = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        command.args(["calibrate", "payload", "--robot", "sim", "--scene", scene, "--truth", truth]);
+        command.args(["--truth-payload-kg", "1.17", "--out", out.to_str().unwrap()]).args(more);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    };
+    let kept = ["--segments-out", path.to_str().unwrap()];
+    let mut child = identify(&kept).spawn().unwrap();
+    let begun = Instant::now();
+    while fs::read_to_string(&path).map_or(0, |text| text.lines().count()) < 3 {
+        assert!(begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "it does not measure");
+        sleep(Duration::from_millis(5));
+    }
+    signal(&child, "INT");
+    let done = child.wait_with_output().unwrap();
+    let stderr = text(&done.stderr);
+    assert_eq!(done.status.code(), Some(130), "{stderr}");
+    let made = read_static_poses(&path).unwrap();
+    assert!(made.len() >= 2 && made.len() < 13, "{}", made.len());
+    let words = format!("; the static segments ({}) are in {}", made.len(), path.display());
+    assert!(stderr.contains(&words), "{stderr}");
+    assert!(!out.exists(), "nothing is concluded from a part of them");
+
+    // what is kept of a whole one is what the payload was identified from: its weight is that of 1.17 kg
+    assert_eq!(identify(&kept).output().unwrap().status.code(), Some(0));
+    let all = read_static_poses(&path).unwrap();
+    let forces: Vec<_> = all.iter().map(|(r_bf, wrench)| r_bf * wrench.force).collect();
+    // the bias turns with the flange, the weight does not: the mean over a cone has little of what lies across it
+    let mean = forces.iter().sum::<nalgebra::Vector3<f64>>() / forces.len() as f64;
+    assert!((mean.norm() - 1.17 * 9.81).abs() < 1.3, "{mean} N of {} segments", all.len());
 }

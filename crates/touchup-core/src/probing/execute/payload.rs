@@ -80,6 +80,7 @@ impl Prober<'_> {
             if (ended_ns - state.stamp_ns) as f64 * 1e-9 > self.params.limits.time {
                 return Err(Ending::TimeSpent.into());
             }
+            self.world.weighed(&segment);
             segments.push(segment);
         }
         self.turn_along(&back)?;

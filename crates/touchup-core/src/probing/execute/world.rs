@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::ending::ProbedTouch;
+use crate::calibrate::StaticPose;
 use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer};
 
@@ -37,6 +38,9 @@ pub trait World: Observer {
     ///
     /// - `flag`: number of the feature; 0 for the touches of a spot.
     fn touched(&mut self, _flag: u32, _touch: &ProbedTouch) {}
+
+    /// Receives each static segment of a payload identification when it is measured, before the arm goes on.
+    fn weighed(&mut self, _segment: &StaticPose) {}
 }
 
 /// What an arm does while it probes.
