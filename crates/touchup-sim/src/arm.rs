@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
+use super::arm_errors::ArmErrors;
 use super::ball::push_ball;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::random::gauss_vector;
@@ -73,6 +74,12 @@ settings! {
         top_joint_speed: f64 = 3.1, positive("the largest speed of a joint", *top_joint_speed, "rad/s");
         /// The arm stops by itself beyond this force, N.
         safety_force: f64 = 150.0, positive("the safety force", *safety_force, "N");
+        /// By what the arm differs from all of the above.
+        errors: ArmErrors = ArmErrors::NONE,
+            positive("the true radius of the ball", radius + errors.radius, "m"),
+            positive("the true stiffness, as a share of that told", 1.0 + errors.stiffness.min(), ""),
+            not_negative("the repeatability", errors.repeatability, "m"),
+            not_negative("the play", errors.play, "m");
         /// Noise comes from it.
         seed: u64 = 1;
     }
@@ -116,6 +123,8 @@ const HARD_STOP: f64 = 8.0;
 const SPIKE: u32 = 3;
 /// The time that a force needs to settle is this many times its latencies.
 const CALM: f64 = 4.0;
+/// Farther than this from its last contact the ball comes anew, with another error of place, m: a second search begins nearer.
+const NEW_APPROACH: f64 = 1e-3;
 /// A line has ended when what is left is less than this, m.
 const ARRIVED: f64 = 1e-9;
 
@@ -125,7 +134,20 @@ pub struct SimArm<'a> {
     params: ArmParams,
     rng: Pcg64,
     torque_rng: Pcg64,
+    approach_rng: Pcg64,
     time: f64,
+    /// of the part in the base, truly
+    pose_bo: Isometry3<f64>,
+    /// truly
+    geometry: UrGeometry,
+    /// from where the tip is by the kinematics as told to where it is, in B
+    kinematic: Isometry3<f64>,
+    /// error of place of this approach, in B, m
+    approach: Vector3<f64>,
+    /// where the drives hold the tip, in B, m
+    driven: Vector3<f64>,
+    /// centre of the ball at the last contact of this approach, in O
+    touched: Option<Point3<f64>>,
     /// of the tip if nothing bent, in B
     nominal: Isometry3<f64>,
     velocity: Vector3<f64>,
@@ -167,16 +189,28 @@ impl<'a> SimArm<'a> {
             .into_iter()
             .max_by(|a, b| params.geometry.dexterity(a).total_cmp(&params.geometry.dexterity(b)))
             .ok_or(SimError::OutOfReach)?;
-        let ball = params.pose_bo.inverse_transform_point(&(start_bt * Point3::from(params.ball_offset)));
-        let clearance_m = surface.signed_distance(&ball);
-        if clearance_m < params.radius {
-            return Err(SimError::StartsInside { clearance_m, radius_m: params.radius });
+        let pose_bo = params.pose_bo * params.errors.displacement();
+        let geometry = params.errors.geometry(&params.geometry);
+        let offset = params.ball_offset + params.errors.tip;
+        let kinematic = kinematic_error(&geometry, &params, &joints);
+        let ball = pose_bo.inverse_transform_point(&(kinematic * start_bt * Point3::from(offset)));
+        let (clearance_m, radius_m) = (surface.signed_distance(&ball), params.radius + params.errors.radius);
+        if clearance_m < radius_m {
+            return Err(SimError::StartsInside { clearance_m, radius_m });
         }
+        let mut approach_rng = Pcg64::seed_from_u64(params.seed ^ 0x2d31_6f0a_94c5_e87b);
         let late = (params.force_latency / STEP).round() as usize;
         Ok(Self {
             surface,
             rng: Pcg64::seed_from_u64(params.seed ^ 0x0a5f_3d21_77c8_9be4),
             torque_rng: Pcg64::seed_from_u64(params.seed ^ 0x51d3_90b7_2e64_fa08),
+            approach: gauss_vector(&mut approach_rng) * params.errors.repeatability,
+            approach_rng,
+            driven: start_bt.translation.vector,
+            touched: None,
+            pose_bo,
+            geometry,
+            kinematic,
             params,
             time: 0.0,
             nominal: *start_bt,
@@ -319,11 +353,26 @@ impl<'a> SimArm<'a> {
         }
     }
 
+    /// Where the ball would be if nothing bent, in O: by the true kinematics, the play and the error of this approach.
+    fn unbent(&mut self) -> Point3<f64> {
+        let ArmParams { ball_offset, errors, .. } = &self.params;
+        let ahead = self.nominal.translation.vector - self.driven;
+        self.driven += ahead - ahead.cap_magnitude(errors.play);
+        let tip = Isometry3::from_parts(self.driven.into(), self.nominal.rotation);
+        let place = self.kinematic * tip * Point3::from(ball_offset + errors.tip);
+        let is_away = |touched: Point3<f64>| (self.ball - touched).norm() > NEW_APPROACH;
+        if self.touched.is_some_and(is_away) {
+            self.touched = None;
+            self.approach = gauss_vector(&mut self.approach_rng) * errors.repeatability;
+        }
+        self.pose_bo.inverse_transform_point(&(place + self.approach))
+    }
+
     /// The ball goes where the part lets it, and pulls.
     fn bend(&mut self) {
-        let pose_bo = self.params.pose_bo;
-        let nominal = pose_bo.inverse_transform_point(&(self.nominal * Point3::from(self.params.ball_offset)));
-        let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, self.params.radius);
+        let (nominal, pose_bo) = (self.unbent(), self.pose_bo);
+        let radius = self.params.radius + self.params.errors.radius;
+        let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, radius);
         let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
         let mut next = rest;
         if let Some(out) = normal.try_normalize(0.0) {
@@ -332,15 +381,21 @@ impl<'a> SimArm<'a> {
             let across = behind - out * behind.dot(&out);
             let most = self.params.friction * normal.norm();
             let kept = across.cap_magnitude(most);
-            next = push_ball(self.surface, &rest, &(rest + kept), self.params.radius).0;
+            next = push_ball(self.surface, &rest, &(rest + kept), radius).0;
         }
         self.ball = next;
-        let force = if contacts.is_empty() { Vector3::zeros() } else { (next - nominal) * self.params.stiffness };
+        let force = if contacts.is_empty() {
+            Vector3::zeros()
+        } else {
+            self.touched = Some(next);
+            let share = self.params.errors.stiffness.add_scalar(1.0) * self.params.stiffness;
+            (pose_bo.rotation * (next - nominal)).component_mul(&share)
+        };
         self.peak_force = self.peak_force.max(force.norm());
         if force.norm() > self.params.safety_force && self.safety == Safety::Normal {
             self.safety = Safety::ProtectiveStop;
         }
-        self.forces.push_back(pose_bo.rotation * force);
+        self.forces.push_back(force);
         self.forces.pop_front();
     }
 
@@ -360,10 +415,10 @@ impl<'a> SimArm<'a> {
         let shaft = self.nominal.rotation * Vector3::z();
         let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
         let torque_noise = gauss_vector(&mut self.torque_rng) * self.params.torque_noise;
-        let ArmParams { payload, pose_ft, ball_offset, force_bias, torque_bias, .. } = &self.params;
+        let ArmParams { payload, pose_ft, ball_offset, errors, force_bias, torque_bias, .. } = &self.params;
         let r_bf = self.flange();
         let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
-        let ball = pose_ft * Point3::from(*ball_offset);
+        let ball = pose_ft * Point3::from(ball_offset + errors.tip);
         Wrench {
             force: contact + r_bf.inverse() * (weight.force + noise) + force_bias,
             torque: ball.coords.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise,
@@ -390,7 +445,17 @@ impl<'a> SimArm<'a> {
             _ if self.safety == Safety::Normal => self.safety = Safety::ProtectiveStop,
             _ => {}
         }
+        self.kinematic = kinematic_error(&self.geometry, &self.params, &self.joints);
     }
+}
+
+/// From where the flange is by the kinematics as told to where it is, in B.
+fn kinematic_error(geometry: &UrGeometry, params: &ArmParams, joints: &Joints) -> Isometry3<f64> {
+    if *geometry == params.geometry && params.errors.joints == [0.0; 6] {
+        return Isometry3::identity();
+    }
+    let truly: Joints = std::array::from_fn(|i| joints[i] + params.errors.joints[i]);
+    geometry.flange(&truly) * params.geometry.flange(joints).inverse()
 }
 
 impl Arm for SimArm<'_> {

@@ -8,6 +8,7 @@
 mod settings;
 
 mod arm;
+mod arm_errors;
 mod ball;
 mod contour;
 pub mod coupled;
@@ -29,6 +30,7 @@ mod triangulate;
 pub mod wavy;
 
 pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
+pub use arm_errors::{ArmErrorSigmas, ArmErrors};
 pub use ball::{BallContact, push_ball};
 pub use error::SimError;
 pub use markers::{CameraParams, see_markers};
