@@ -111,6 +111,7 @@ units! {
     QUATERNION "(length of the quaternion)";
     MM "mm" per 1e3;
     MM_PER_S "mm/s" per 1e3;
+    MM_PER_M "mm/m" per 1e3;
     MM_PER_S2 "mm/s²" per 1e3;
     MS "ms" per 1e3;
     PERCENT "%" per 100.0;

@@ -1,5 +1,6 @@
 //! Probing results, as a table, as JSON, and touch by touch.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,7 @@ reported! {
         kind: String = kind_of(flagged).to_owned(),
         flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
         search_radius_mm: f64 = flagged.radius * 1e3,
-        /// how it ended: `tolerance_reached`, `touches_spent`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
+        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
         /// `no_clear_path`, `stopped`
         code: String = code(&probed.ending).to_owned(),
         /// the same in words
@@ -34,6 +35,15 @@ reported! {
         largest_force_n: f64 = probed.peak_force,
         /// of the wanted number, mm or rad
         uncertainty_mm?: f64 = probed.found.as_ref().and_then(|found| found.uncertainty).map(|sigma| sigma * 1e3),
+        /// the part of it that all touches have in common: radius, place of the part, kinematics
+        shared_uncertainty_mm?: f64 = probed.found.as_ref().filter(|found| found.uncertainty.is_some()).map(|found| found.shared * 1e3),
+        /// `std` of `feature` by the scatter of its touches alone
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        std_of_touches: BTreeMap<String, f64> = probed
+            .found
+            .as_ref()
+            .and_then(|found| found.by_touches.as_ref())
+            .map_or_else(BTreeMap::new, |feature| FeatureRecord::of(feature).std),
         feature?: FeatureRecord = probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(FeatureRecord::of),
     }
 }
@@ -63,7 +73,10 @@ pub(super) fn kind_of(flag: &Flag) -> &'static str {
 impl ProbedRecord {
     /// Whether the arm probed it to an end, found or not.
     pub(super) fn is_finished(&self) -> bool {
-        matches!(self.code.as_str(), "tolerance_reached" | "touches_spent" | "time_spent" | "nothing_found")
+        matches!(
+            self.code.as_str(),
+            "tolerance_reached" | "touches_spent" | "calibration_limits" | "time_spent" | "nothing_found"
+        )
     }
 
     /// Whether a stop of the arm, or a signal, ended it.
@@ -121,6 +134,7 @@ fn code(ending: &Ending) -> &'static str {
     match ending {
         Ending::ToleranceReached => "tolerance_reached",
         Ending::TouchesSpent => "touches_spent",
+        Ending::CalibrationLimits { .. } => "calibration_limits",
         Ending::TimeSpent => "time_spent",
         Ending::NothingFound(_) => "nothing_found",
         Ending::Cancelled(_) => "cancelled",

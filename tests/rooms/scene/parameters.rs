@@ -95,6 +95,11 @@ robot.tolerance_mm mm 0.02 0.0001 10
 robot.confidence - 0.95 0.5 0.9999
 robot.touches touches 39 1 10000
 robot.touch_sigma_mm mm 0.005 1e-5 1
+robot.radius_sigma_mm mm 0.001 0 10
+robot.place_sigma_mm mm 0 0 100
+robot.turn_sigma_deg degrees 0 0 20
+robot.growth_mm_per_m mm/m 0 0 100
+robot.registered_at_mm mm [0,0,0] -1e6 1e6
 refine.f_max_n N 10 1e-6 1e6
 refine.h_min_mm mm 0.5 1e-9 1e6
 refine.delta - 5 -50 50
@@ -273,6 +278,7 @@ fn written(row: &Row, x: f64) -> String {
         "region_",
         "workspace_",
         "robot.arm_",
+        "registered_at_mm",
     ];
     match row.key {
         _ if row.unit == "length" => format!("[{x}, 0, 0, 0]"),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::probing::arm::{Arm, Command};
-use touchup::sim::{ArmParams, Plate, SimArm};
+use touchup::sim::{ArmErrors, ArmParams, Plate, SimArm};
 
 /// Where the top of the plate is flat for 20 mm, and how high it is, m.
 const START: [f64; 3] = [40e-3, 8e-3, 12e-3];
@@ -47,4 +47,23 @@ fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
         let pulled = force.xy().norm() / force.z;
         assert!((pulled - friction).abs() < 1e-3 && (friction == 0.0 || force.x < 0.0), "{friction}: {force}");
     }
+}
+
+/// An encoder of the base that is off by δ turns the arm by δ about the axis of the base; a part that lies off by t and is turned by ω
+/// sees the ball at the inverse of that.
+#[test]
+fn an_arm_with_errors_is_where_they_put_it() {
+    let plate = Plate::default();
+    let (params, start) = quiet(5e-3);
+    let place = params.pose_bo.inverse_transform_point(&Point3::from(start.translation.vector));
+    let ball = |errors: ArmErrors| SimArm::new(&plate, ArmParams { errors, ..params }, &start).unwrap().ball();
+    let joints = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 1e-3) * start.translation.vector;
+    let expected = params.pose_bo.inverse_transform_point(&Point3::from(turned));
+    assert!((ball(ArmErrors { joints, ..ArmErrors::NONE }) - expected).norm() < 1e-12);
+    let (shift, turn) = (Vector3::new(0.1e-3, -0.2e-3, 0.3e-3), Vector3::new(0.0, 0.0, 2e-3));
+    let displaced = ArmErrors { shift, turn, turned_about: place, ..ArmErrors::NONE };
+    // the turn about where the ball is told to be leaves the shift alone, seen in the turned axes
+    let seen = place - UnitQuaternion::from_scaled_axis(-turn) * shift;
+    assert!((ball(displaced) - seen).norm() < 1e-12, "{} {seen}", ball(displaced));
 }

@@ -143,7 +143,8 @@ fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
 fn code_of(ending: &Ending) -> u8 {
     match ending {
         Ending::ToleranceReached => ProbeResult::TOLERANCE_REACHED,
-        Ending::TouchesSpent => ProbeResult::TOUCHES_SPENT,
+        // as good as touches can make it; the message has the reason
+        Ending::TouchesSpent | Ending::CalibrationLimits { .. } => ProbeResult::TOUCHES_SPENT,
         Ending::TimeSpent => ProbeResult::TIME_SPENT,
         Ending::NothingFound(_) => ProbeResult::NOTHING_FOUND,
         Ending::Cancelled(request) => cancelled(*request),

@@ -417,7 +417,10 @@ impl ArmWorker {
         if let Err(error) = append_probed_touches(&probed, ball_radius, offset_ns, &folder.join(TOUCHES)) {
             warn!(%error, "the touches of a feature are on the topic alone");
         }
-        let is_whole = matches!(probed.ending, Ending::ToleranceReached | Ending::TouchesSpent | Ending::TimeSpent);
+        let is_whole = matches!(
+            probed.ending,
+            Ending::ToleranceReached | Ending::TouchesSpent | Ending::CalibrationLimits { .. } | Ending::TimeSpent
+        );
         if let Some(feature) = probed.found.as_ref().and_then(|found| found.feature.clone()).filter(|_| is_whole) {
             // the number that was wanted is still wanted, where it is not known well enough
             let is_done = matches!(probed.ending, Ending::ToleranceReached);

@@ -2,6 +2,7 @@ mod command;
 mod interrupted;
 mod planning;
 mod sliding;
+mod uncertainty;
 
 use nalgebra::Point3;
 use touchup::probing::arm::{Limits, TouchParams};

@@ -17,6 +17,15 @@ pub enum Ending {
     /// The touches are spent; it is as good as they made it.
     #[error("tolerance not reached: the touches are spent")]
     TouchesSpent,
+    /// More touches would not help.
+    #[error(
+        "tolerance not reached: what radius of the ball, place of the part and kinematics leave uncertain is in all touches alike, and \
+         with it the number is {over:.1} times as uncertain as asked for: calibrate them, or ask for less"
+    )]
+    CalibrationLimits {
+        /// standard uncertainty over the requested one
+        over: f64,
+    },
     /// The time is spent.
     #[error("tolerance not reached: the time is spent")]
     TimeSpent,

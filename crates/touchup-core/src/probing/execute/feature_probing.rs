@@ -57,7 +57,9 @@ impl<'a> Prober<'a> {
         let ending = match (ended, &found) {
             (Err(ending), _) => ending,
             (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
-            (Ok(()), Ok(_)) => Ending::TouchesSpent,
+            (Ok(()), Ok(found)) => {
+                found.limited.map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits { over })
+            }
             (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
         };
         Probed {

@@ -22,6 +22,12 @@ pub struct Found {
     pub is_as_asked: bool,
     /// standard uncertainty of the number, m or rad
     pub uncertainty: Option<f64>,
+    /// the part of it that all touches have in common: radius, place of the part, kinematics; m or rad
+    pub shared: f64,
+    /// where the touches have done what they can, and that part keeps the number from what was asked for: uncertainty over the requested one
+    pub limited: Option<f64>,
+    /// the feature with the uncertainties that come from the scatter of its touches alone
+    pub by_touches: Option<Feature>,
 }
 
 /// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch, [`Explorer::take`] takes its
@@ -32,7 +38,17 @@ pub struct Explorer {
     stage: Box<dyn Stage>,
     asked: Option<TouchPlan>,
     ended: Option<Result<bool, ExploreError>>,
+    kind: Option<Kind>,
+    /// requested of the number, m or rad
+    wanted: f64,
+    /// m or rad
+    shared: f64,
 }
+
+/// Where what touches leave is this share of what all of them have in common, more touches add a twentieth at most.
+const LEAST_SHARE: f64 = 1.0 / 3.0;
+/// Of two roots.
+const ROUNDING: f64 = 1e-9;
 
 impl Explorer {
     /// - `kind`: what it is; `None`: unknown. Pockets are explored as slots.
@@ -60,8 +76,11 @@ impl Explorer {
             None => Box::new(region::RegionPattern::new(&params)),
         };
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
-        let context = SearchContext { params, pose_of, height: 0.0, touches: 0 };
-        Ok(Self { context, stage, asked: None, ended: None })
+        let (shared, wanted) = (params.shared.of(kind, params.quantity, flag, normal), params.sigma);
+        // of the touches no more is asked than makes a difference
+        let sigma = (wanted.powi(2) - shared.powi(2)).max(0.0).sqrt().max(LEAST_SHARE * shared);
+        let context = SearchContext { params: PatternParams { sigma, ..params }, pose_of, height: 0.0, touches: 0 };
+        Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared })
     }
 
     /// Touches so far.
@@ -71,7 +90,7 @@ impl Explorer {
 
     /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
     pub fn uncertainty(&self) -> Option<f64> {
-        self.stage.uncertainty(&self.context)
+        self.stage.uncertainty(&self.context).map(|sigma| sigma.hypot(self.shared))
     }
 
     /// The next planned touch; `None` when it is done, or cannot be ([`Self::found`] says which).
@@ -100,7 +119,10 @@ impl Explorer {
         self.context.touches += 1;
         let (offset, group) = (self.context.params.ball_radius, self.context.touches as u32);
         let observation = match *result {
-            TouchResult::At { centre, sigma } => Some(Observation { point: centre, offset, sigma, group }),
+            TouchResult::At { centre, sigma } => {
+                let sigma = sigma.hypot(self.context.params.touch_sigma);
+                Some(Observation { point: centre, offset, sigma, group })
+            }
             TouchResult::Nothing | TouchResult::Unclear => None,
         };
         let place = observation.map(|contact| self.context.in_f(&contact.point));
@@ -117,11 +139,20 @@ impl Explorer {
             Some(Ok(is_as_asked)) => *is_as_asked,
             None => false,
         };
+        let over = self.uncertainty().map(|sigma| sigma / self.wanted);
+        let limited = over.filter(|over| is_as_asked && *over > 1.0 + ROUNDING);
+        let by_touches = self.stage.feature(&self.context)?;
+        let place = by_touches.as_ref().map(|feature| feature.centre.value);
+        let PatternParams { shared, quantity, .. } = self.context.params;
+        let out = self.context.out();
         Ok(Found {
-            feature: self.stage.feature(&self.context)?,
+            feature: by_touches.clone().map(|feature| shared.widened(feature)),
             touches: self.context.touches,
-            is_as_asked,
+            is_as_asked: is_as_asked && limited.is_none(),
+            limited,
             uncertainty: self.uncertainty(),
+            shared: place.map_or(self.shared, |place| shared.of(self.kind, quantity, &place, &out)),
+            by_touches,
         })
     }
 }

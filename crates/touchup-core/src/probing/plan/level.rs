@@ -48,6 +48,7 @@ impl SearchContext {
     /// Normal of the plane that most touches lie on, and those touches.
     fn most_plane(&self, observations: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
         let least = SPREAD * self.params.ball_radius;
+        let of_plane = self.params.beyond(OF_PLANE);
         let (mut best, mut most) = (Vec::new(), (0, 0.0));
         for (i, a) in observations.iter().enumerate() {
             for (j, b) in observations.iter().enumerate().skip(i + 1) {
@@ -60,8 +61,8 @@ impl SearchContext {
                     }
                     let normal = area.normalize() * area.dot(&self.out()).signum();
                     let off = |o: &Observation| (o.point - a.point).dot(&normal);
-                    let inliers = || observations.iter().filter(|o| off(o).abs() < OF_PLANE);
-                    let is_allowed = !is_top || observations.iter().all(|o| off(o) < OF_PLANE);
+                    let inliers = || observations.iter().filter(|o| off(o).abs() < of_plane);
+                    let is_allowed = !is_top || observations.iter().all(|o| off(o) < of_plane);
                     // among equals the one that is most as the scan has it
                     let score = (inliers().count(), normal.dot(&self.out()));
                     let is_better = score.0 > most.0 || score.0 == most.0 && score.1 > most.1;

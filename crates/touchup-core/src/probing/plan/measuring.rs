@@ -45,7 +45,7 @@ impl Wanted {
     fn known<'a, M: Surface>(&self, surface: &M, touches: impl Iterator<Item = &'a Observation>) -> Knowledge {
         touches.fold(self.before.clone(), |known, o| {
             // the ball's centre lies on the same normal as the place that it touches
-            known.with(surface, &Candidate { point: o.point, sigma: o.sigma.max(self.params.touch_sigma) })
+            known.with(surface, &Candidate { point: o.point, sigma: o.sigma })
         })
     }
 }

@@ -5,6 +5,7 @@
 //! a [`Slide`] leads over the whole of what was found, for the mesh.
 
 mod advice;
+mod arm_uncertainty;
 mod boss;
 mod cylinder_fit;
 mod design;
@@ -25,6 +26,7 @@ mod slot_fit;
 mod tolerance;
 
 pub use advice::{NextTouch, advise_next_touch};
+pub use arm_uncertainty::ArmUncertainty;
 pub use design::{Asked, Candidate, Knowledge};
 pub use error::ExploreError;
 pub use explorer::{Explorer, Found};

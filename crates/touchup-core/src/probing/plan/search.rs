@@ -91,7 +91,11 @@ impl OpeningSearch {
         let step = STEP * ball_radius;
         let is_new =
             |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
-        let deepest = self.tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, depth)| *depth > SUNK);
+        let deepest = self
+            .tried
+            .iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, depth)| *depth > context.params.beyond(SUNK));
         let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
         let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
         let places = hexagonal(step, Self::farthest(&context.params));
@@ -109,14 +113,14 @@ impl OpeningSearch {
             (_, Some(place), Some(observation)) => {
                 let surface = context.below(&place);
                 // the highest is the surface; what is lower is a rim, or lower ground
-                if self.tried.is_empty() || surface > context.height + SUNK {
+                if self.tried.is_empty() || surface > context.height + context.params.beyond(SUNK) {
                     let lower = surface - context.height;
                     self.tried.iter_mut().for_each(|(_, depth)| *depth += lower);
                     context.height = surface;
                     self.top.clear();
                 }
                 let depth = context.height - surface;
-                if depth < FLAT {
+                if depth < context.params.beyond(FLAT) {
                     self.top.push(observation);
                 }
                 self.tried.push((Point3::new(place.x, place.y, 0.0), depth));

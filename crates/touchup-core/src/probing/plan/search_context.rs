@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
+use super::arm_uncertainty::ArmUncertainty;
 use crate::features::fit::Observation;
 use crate::features::{End, Kind};
 use crate::{names, parameters};
@@ -30,10 +31,14 @@ parameters! {
         sigma: f64 = 4e-6;
         /// Touches of a feature at most.
         budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
-        /// Expected standard deviation of one touch.
+        /// Standard deviation of one touch beside that of its own curve: the repeatability of arm and probe (`touchup check`).
         ///
         /// In m.
         touch_sigma: f64 = 0.005, "touch_sigma_mm" [MM, 1e-5, 1];
+    }
+    with {
+        /// What all touches have in common.
+        shared: ArmUncertainty,
     }
 }
 
@@ -66,6 +71,18 @@ impl Quantity {
             Self::Diameter => matches!(kind, Some(Kind::Hole | Kind::Boss)),
             Self::Length | Self::Width => kind == Some(Kind::Slot),
         }
+    }
+}
+
+/// Touches of one surface differ by no more than so many standard deviations: the difference of two by 4 of its own.
+const BEYOND: f64 = 5.7;
+
+impl PatternParams {
+    /// A difference of heights that is no scatter of touches, m.
+    ///
+    /// - `least`: what it is for an arm without scatter, m.
+    pub(super) fn beyond(&self, least: f64) -> f64 {
+        least.max(BEYOND * self.touch_sigma)
     }
 }
 

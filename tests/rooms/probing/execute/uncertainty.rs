@@ -1,0 +1,187 @@
+//! An arm that differs from what is told of it: the errors of the numbers are as large as their stated uncertainties.
+
+use std::fmt::Write as _;
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use touchup::features::{Feature, Kind};
+use touchup::mesh::TriMesh;
+use touchup::probing::execute::{Ending, Flag, ProbeParams, Prober, StaticWorld};
+use touchup::probing::plan::{ArmUncertainty, PatternParams};
+use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmParams, Plate, SimArm};
+
+use super::{cell, params};
+use crate::full::{either, is_full};
+use crate::plate_stream::plate_scan;
+
+/// As the issue has them: 10 % of the stiffness, 0.05 mm of the radius, 0.2 mm and 0.2° of the place, 0.05 mm of repeatability.
+const SIGMAS: ArmErrorSigmas = ArmErrorSigmas {
+    stiffness: 0.1,
+    radius: 50e-6,
+    tip: 0.0,
+    shift: 0.2e-3,
+    turn: 0.2 * std::f64::consts::PI / 180.0,
+    joints: 0.0,
+    lengths: 0.0,
+    repeatability: 50e-6,
+    play: 0.0,
+};
+/// The middle of the plate.
+const ABOUT: Point3<f64> = Point3::new(30e-3, 25e-3, 12e-3);
+
+/// A feature of the plate by its drawing: where it is, its axis, across which directions its place counts, and its sizes, m.
+struct Drawn {
+    name: &'static str,
+    kind: Kind,
+    place: [f64; 3],
+    axis: Vector3<f64>,
+    /// those in which its place is determined
+    across: &'static [[f64; 3]],
+    sizes: &'static [f64],
+}
+
+const DRAWN: [Drawn; 5] = [
+    Drawn {
+        name: "hole",
+        kind: Kind::Hole,
+        place: [16e-3, 36e-3, 12e-3],
+        axis: Vector3::new(0.0, 0.0, 1.0),
+        across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        sizes: &[8e-3],
+    },
+    Drawn {
+        name: "slot",
+        kind: Kind::Slot,
+        place: [25e-3, 14e-3, 12e-3],
+        axis: Vector3::new(0.0, 0.0, 1.0),
+        across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        sizes: &[6e-3, 20e-3],
+    },
+    Drawn {
+        name: "boss",
+        kind: Kind::Boss,
+        place: [47e-3, 25e-3, 12e-3],
+        axis: Vector3::new(0.0, 0.0, 1.0),
+        across: &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        sizes: &[10e-3],
+    },
+    Drawn {
+        name: "plane",
+        kind: Kind::Plane,
+        place: [45e-3, 9e-3, 12e-3],
+        axis: Vector3::new(0.0, 0.0, 1.0),
+        across: &[[0.0, 0.0, 1.0]],
+        sizes: &[],
+    },
+    Drawn {
+        name: "edge",
+        kind: Kind::Edge,
+        place: [60e-3, 25e-3, 12e-3],
+        axis: Vector3::new(0.0, 1.0, 0.0),
+        across: &[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        sizes: &[],
+    },
+];
+
+/// Error over stated uncertainty of place, direction, and each size.
+type Normalised = (f64, f64, Vec<f64>);
+
+impl Drawn {
+    /// The numbers are in the frame of the scan, which is that of the drawing: that the part lies elsewhere in the base than is told is an
+    /// error of each place and direction.
+    fn normalised(&self, found: &Feature) -> Normalised {
+        let (place, axis) = (Point3::from(self.place), self.axis);
+        let off = found.centre.value - place;
+        let across =
+            self.across.iter().map(|direction| off.dot(&Vector3::from(*direction)).powi(2)).sum::<f64>().sqrt();
+        let measured = found.axis.as_ref().unwrap();
+        // no component along it counts
+        let lean = measured.value.cross(&axis).norm();
+        let sizes = [&found.diameter, &found.width, &found.length].into_iter().flatten();
+        let sizes = sizes.filter(|_| self.kind != Kind::Edge).zip(self.sizes);
+        let sizes = sizes.map(|(size, drawn)| (size.value - drawn).abs() / size.std.unwrap()).collect();
+        (across / found.centre.std.unwrap(), lean / measured.std.unwrap(), sizes)
+    }
+}
+
+/// Told uncertainties are those that the errors are drawn from.
+fn told() -> ProbeParams {
+    let ArmErrorSigmas { radius, shift, turn, repeatability, .. } = SIGMAS;
+    let shared =
+        ArmUncertainty { radius, place: shift, turn, registered_at: ABOUT.coords, ..ArmUncertainty::default() };
+    let pattern = PatternParams { sigma: 0.25e-3, touch_sigma: repeatability, shared, ..params().pattern };
+    ProbeParams { pattern, ..params() }
+}
+
+/// Probes a feature of the plate with an arm that differs from what is told.
+fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh) -> Result<Normalised, String> {
+    let (plate, cell, params) = (Plate::default(), cell(), told());
+    let errors = ArmErrors::draw(&SIGMAS, ABOUT, seed);
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..2e-3));
+    let height = if drawn.kind == Kind::Boss { 4e-3 } else { 0.0 };
+    let place = Point3::from(drawn.place) + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), height);
+    let flag = Flag { id: 1, kind: Some(drawn.kind), place, radius: 3e-3 };
+    let start: Isometry3<f64> = cell.pose(&UnitQuaternion::identity(), &Point3::new(30e-3, 25e-3, 50e-3));
+    let mut arm = SimArm::new(&plate, ArmParams { seed, errors, ..ArmParams::default() }, &start).unwrap();
+    let mut world = StaticWorld::new(scan.clone());
+    let probed = Prober::new(&mut arm, &cell, &params, &mut world).probe(&flag);
+    match probed.found.and_then(|found| found.feature) {
+        Some(feature)
+            if matches!(
+                probed.ending,
+                Ending::ToleranceReached | Ending::CalibrationLimits { .. } | Ending::TouchesSpent
+            ) =>
+        {
+            Ok(drawn.normalised(&feature))
+        }
+        _ => Err(format!("{} with seed {seed}: {}", drawn.name, probed.ending)),
+    }
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+/// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of 6 errors of one dimension over their
+/// deviation is 0.13 to 2.16; with 50 (`--full`) 0.001 below 24.7 and above 86.7, so 0.70 to 1.32. More dimensions scatter less. The errors of
+/// each feature are drawn apart.
+///
+/// The lower bound is not one for directions: that a hole is perpendicular to its surface is believed within 0.02 rad, and those of the plate
+/// are so exactly. Some are not found: where places are off by some tenths of a millimetre the ball meets the part on its way out, and an edge
+/// is taken for a low one.
+#[test]
+fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
+    let (seeds, [least, most]) = (either(6, 50), either([0.13, 2.16], [0.70, 1.32]));
+    let scan = plate_scan(1);
+    let mut table = String::from("| feature | number | error over ±, rms | found |\n|---|---|---|---|\n");
+    let mut wrong = Vec::new();
+    for (drawn, apart) in DRAWN.iter().zip((0..).step_by(1000)) {
+        let results: Vec<_> = (1..=seeds).map(|seed| probed(drawn, apart + seed, &scan)).collect();
+        let found: Vec<&Normalised> = results.iter().filter_map(|result| result.as_ref().ok()).collect();
+        let missed: Vec<String> = results.iter().filter_map(|result| result.as_ref().err().cloned()).collect();
+        println!("{}", missed.join("\n"));
+        if missed.len() > either(1, 4) {
+            wrong.extend(missed);
+        }
+        let of = |number: fn(&Normalised, usize) -> f64, at| {
+            rms(&found.iter().map(|one| number(one, at)).collect::<Vec<_>>())
+        };
+        let mut numbers = vec![("place", of(|one, _| one.0, 0)), ("direction", of(|one, _| one.1, 0))];
+        let names = if drawn.kind == Kind::Slot { ["width", "length"] } else { ["diameter", ""] };
+        numbers.extend((0..drawn.sizes.len()).map(|at| (names[at], of(|one, at| one.2[at], at))));
+        for (number, rms) in numbers {
+            writeln!(table, "| {} | {number} | {rms:.2} | {} of {seeds} |", drawn.name, found.len()).unwrap();
+            let least = if number == "direction" { 0.0 } else { least };
+            if !(least..=most).contains(&rms) {
+                wrong.push(format!("{} {number}: {rms:.2}", drawn.name));
+            }
+        }
+    }
+    println!("{table}");
+    if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
+        std::fs::write(std::path::Path::new(&folder).join("arm_uncertainty.md"), &table).unwrap();
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
