@@ -7,7 +7,6 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::search_context::Quantity;
 use crate::features::{Feature, Kind, Measured};
 use crate::parameters;
 
@@ -48,25 +47,17 @@ impl ArmUncertainty {
         Matrix3::identity() * along_each + (square - lever * lever.transpose()) * self.turn.powi(2)
     }
 
-    /// The part of the wanted number of a feature that no touch reduces: the largest of its numbers; m, or rad of an axis.
+    /// Of the place of a feature in the direction in which it is largest, m.
     ///
     /// - `out`: of the surface, unit vector.
-    pub(super) fn of(&self, kind: Option<Kind>, quantity: Quantity, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
-        let Some(kind) = kind else { return 0.0 };
+    pub(super) fn position(&self, kind: Kind, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
         let shift = self.shift(place);
-        let size = 2.0 * self.radius;
-        let position = match kind {
+        let largest = shift.symmetric_eigenvalues().max().max(0.0).sqrt();
+        match kind {
             Kind::Plane => along(&shift, out).hypot(self.radius),
             // each of its faces is one number
-            Kind::Edge => shift.symmetric_eigenvalues().max().max(0.0).sqrt().hypot(self.radius),
-            _ => shift.symmetric_eigenvalues().max().max(0.0).sqrt(),
-        };
-        match quantity {
-            Quantity::Axis => self.turn,
-            Quantity::Position => position,
-            Quantity::Diameter | Quantity::Width | Quantity::Length => size,
-            Quantity::All if matches!(kind, Kind::Plane | Kind::Edge) => position,
-            Quantity::All => position.max(size),
+            Kind::Edge => largest.hypot(self.radius),
+            _ => largest,
         }
     }
 

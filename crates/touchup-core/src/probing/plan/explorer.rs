@@ -76,7 +76,7 @@ impl Explorer {
             None => Box::new(region::RegionPattern::new(&params)),
         };
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
-        let (shared, wanted) = (params.shared.of(kind, params.quantity, flag, normal), params.sigma);
+        let (shared, wanted) = (params.shared_part(kind, flag, normal), params.sigma);
         // of the touches no more is asked than makes a difference
         let sigma = (wanted.powi(2) - shared.powi(2)).max(0.0).sqrt().max(LEAST_SHARE * shared);
         let context = SearchContext { params: PatternParams { sigma, ..params }, pose_of, height: 0.0, touches: 0 };
@@ -143,15 +143,14 @@ impl Explorer {
         let limited = over.filter(|over| is_as_asked && *over > 1.0 + ROUNDING);
         let by_touches = self.stage.feature(&self.context)?;
         let place = by_touches.as_ref().map(|feature| feature.centre.value);
-        let PatternParams { shared, quantity, .. } = self.context.params;
-        let out = self.context.out();
+        let (params, out) = (&self.context.params, self.context.out());
         Ok(Found {
-            feature: by_touches.clone().map(|feature| shared.widened(feature)),
+            feature: by_touches.clone().map(|feature| params.shared.widened(feature)),
             touches: self.context.touches,
             is_as_asked: is_as_asked && limited.is_none(),
             limited,
             uncertainty: self.uncertainty(),
-            shared: place.map_or(self.shared, |place| shared.of(self.kind, quantity, &place, &out)),
+            shared: place.map_or(self.shared, |place| params.shared_part(self.kind, &place, &out)),
             by_touches,
         })
     }

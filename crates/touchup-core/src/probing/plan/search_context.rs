@@ -78,6 +78,20 @@ impl Quantity {
 const BEYOND: f64 = 5.7;
 
 impl PatternParams {
+    /// The part of the wanted number of a feature that no touch reduces: the largest of its numbers; m, or rad of an axis.
+    ///
+    /// - `out`: of the surface, unit vector.
+    pub(super) fn shared_part(&self, kind: Option<Kind>, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
+        let Some(kind) = kind else { return 0.0 };
+        let (position, size) = (self.shared.position(kind, place, out), 2.0 * self.shared.radius);
+        match self.quantity {
+            Quantity::Axis => self.shared.turn,
+            Quantity::Diameter | Quantity::Width | Quantity::Length => size,
+            Quantity::All if !matches!(kind, Kind::Plane | Kind::Edge) => position.max(size),
+            Quantity::Position | Quantity::All => position,
+        }
+    }
+
     /// A difference of heights that is no scatter of touches, m.
     ///
     /// - `least`: what it is for an arm without scatter, m.
