@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
-use touchup::probing::arm::{Joints, UrGeometry};
+use touchup::probing::arm::Joints;
 use touchup::sim::{ArmParams, Surface, push_ball};
 use touchup::stylus::Payload;
 
@@ -82,9 +82,7 @@ impl<'a> Body<'a> {
     pub fn new(surface: &'a (dyn Surface + Sync), params: ArmParams, start: Point3<f64>) -> anyhow::Result<Self> {
         let place = params.pose_bo * start;
         let nominal = Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity());
-        let solutions = params.geometry.inverse(&(nominal * params.pose_ft.inverse()), &[0.0; 6]);
-        let room = |joints: &Joints| params.geometry.dexterity(joints);
-        let joints = solutions.into_iter().max_by(|a, b| room(a).total_cmp(&room(b)));
+        let joints = params.geometry.most_dexterous(&(nominal * params.pose_ft.inverse()));
         let late = (params.force_latency / STEP).round() as usize;
         Ok(Self {
             surface,
@@ -148,19 +146,9 @@ impl<'a> Body<'a> {
         (0..STEPS).for_each(|_| self.step());
         self.spike = self.spike.saturating_sub(1);
         let flange = self.flange();
-        let turn = |a: f64, b: f64| (a - b + 3.0 * std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
-        let far = |joints: &Joints| {
-            let margins = joints.iter().zip(&self.joints).map(|(a, b)| (turn(*a, *b) - std::f64::consts::PI).abs());
-            margins.fold(0.0, f64::max)
-        };
-        let solutions = self.geometry().inverse(&flange, &self.joints);
-        if let Some(next) = solutions.into_iter().min_by(|a, b| far(a).total_cmp(&far(b))) {
+        if let Ok(next) = self.params.geometry.nearest(&flange, &self.joints) {
             self.joints = next;
         }
-    }
-
-    fn geometry(&self) -> UrGeometry {
-        self.params.geometry
     }
 
     fn step(&mut self) {

@@ -56,7 +56,7 @@ impl States {
         let six = |a: nalgebra::Vector3<f64>, b: nalgebra::Vector3<f64>| [a.x, a.y, a.z, b.x, b.y, b.z];
         Self {
             time: controller.body.time,
-            q: controller.body.joints,
+            q: std::array::from_fn(|joint| controller.body.joints[joint]),
             pose: six(place, turn),
             speed: six(linear, angular),
             force: six(force, nalgebra::Vector3::zeros()),

@@ -178,7 +178,7 @@ impl Arm for UrArm {
             pose_bt: pose_of(state.pose),
             wrench_b: wrench(state.wrench),
             raw_wrench_f: wrench(state.raw_wrench),
-            joints: state.joints,
+            joints: state.joints.into(),
             safety: state.safety(),
         })
     }

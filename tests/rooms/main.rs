@@ -1,5 +1,7 @@
 //! All tests that need no device: one module a room, linked once.
 
+#[path = "../common/chains.rs"]
+mod chains;
 #[path = "../common/mod.rs"]
 mod common;
 #[path = "../common/full.rs"]

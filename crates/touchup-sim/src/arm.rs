@@ -1,4 +1,4 @@
-//! A UR arm with a probe that bends, against a known surface, in its own time.
+//! An arm with a probe that bends, against a known surface, in its own time.
 //!
 //! The arm follows its command with a limited acceleration, some milliseconds late. Its encoders say where its tip would be
 //! if nothing bent: x_c. The ball is at x, where the part lets it be, and arm and probe pull it back with K (x_c − x), so the
@@ -16,17 +16,19 @@ use super::ball::push_ball;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::random::gauss_vector;
 use super::surface::Surface;
-use touchup_core::probing::arm::{Arm, ArmError, ArmState, Command, Joints, Safety, UrGeometry};
+use touchup_core::probing::arm::{
+    Arm, ArmError, ArmGeometry, ArmState, Command, Joints, MOST_JOINTS, Safety, UrGeometry,
+};
 use touchup_core::stylus::{Payload, Wrench};
 
 settings! {
     /// The arm, how it is mounted, and what is not ideal about it.
-    #[derive(Clone, Copy, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq)]
     pub struct ArmParams,
     /// A UR5e, the part on a table before it; a probe of 150 mm with a 3 mm ball, held upright.
     default {
         /// Lengths.
-        geometry: UrGeometry = UrGeometry::UR5E;
+        geometry: ArmGeometry = UrGeometry::UR5E.into();
         /// The part in the base.
         pose_bo: Isometry3<f64> = Isometry3::translation(-0.4, -0.1, 0.05);
         /// The tip (centre of its ball, z from tip to handle) in the flange.
@@ -139,7 +141,7 @@ pub struct SimArm<'a> {
     /// of the part in the base, truly
     pose_bo: Isometry3<f64>,
     /// truly
-    geometry: UrGeometry,
+    geometry: ArmGeometry,
     /// from where the tip is by the kinematics as told to where it is, in B
     kinematic: Isometry3<f64>,
     /// error of place of this approach, in B, m
@@ -182,13 +184,7 @@ impl<'a> SimArm<'a> {
     pub fn new(surface: &'a dyn Surface, params: ArmParams, start_bt: &Isometry3<f64>) -> Result<Self, SimError> {
         params.check()?;
         let flange = start_bt * params.pose_ft.inverse();
-        let folded = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
-        let solutions = params.geometry.inverse(&flange, &folded);
-        // the one with most room to move
-        let joints = solutions
-            .into_iter()
-            .max_by(|a, b| params.geometry.dexterity(a).total_cmp(&params.geometry.dexterity(b)))
-            .ok_or(SimError::OutOfReach)?;
+        let joints = params.geometry.most_dexterous(&flange).ok_or(SimError::OutOfReach)?;
         let pose_bo = params.pose_bo * params.errors.displacement();
         let geometry = params.errors.geometry(&params.geometry);
         let offset = params.ball_offset + params.errors.tip;
@@ -434,27 +430,24 @@ impl<'a> SimArm<'a> {
     /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.
     fn follow_joints(&mut self) {
         let flange = self.nominal * self.params.pose_ft.inverse();
-        let far = |a: &Joints, b: &Joints| {
-            let turn = |x: f64| (x + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
-            a.iter().zip(b).map(|(a, b)| turn(a - b).abs()).fold(0.0, f64::max)
-        };
-        let solutions = self.params.geometry.inverse(&flange, &self.joints);
-        let next = solutions.into_iter().min_by(|a, b| far(a, &self.joints).total_cmp(&far(b, &self.joints)));
-        match next {
-            Some(next) if far(&next, &self.joints) <= self.params.top_joint_speed * PERIOD => self.joints = next,
-            _ if self.safety == Safety::Normal => self.safety = Safety::ProtectiveStop,
-            _ => {}
+        let most = self.params.top_joint_speed * PERIOD;
+        let is_near = |next: &Joints| next.iter().zip(self.joints.iter()).all(|(next, now)| (next - now).abs() <= most);
+        match self.params.geometry.nearest(&flange, &self.joints).ok().filter(is_near) {
+            Some(next) => self.joints = next,
+            None if self.safety == Safety::Normal => self.safety = Safety::ProtectiveStop,
+            None => {}
         }
         self.kinematic = kinematic_error(&self.geometry, &self.params, &self.joints);
     }
 }
 
 /// From where the flange is by the kinematics as told to where it is, in B.
-fn kinematic_error(geometry: &UrGeometry, params: &ArmParams, joints: &Joints) -> Isometry3<f64> {
-    if *geometry == params.geometry && params.errors.joints == [0.0; 6] {
+fn kinematic_error(geometry: &ArmGeometry, params: &ArmParams, joints: &Joints) -> Isometry3<f64> {
+    let offsets = params.errors.joints;
+    if *geometry == params.geometry && offsets == [0.0; MOST_JOINTS] {
         return Isometry3::identity();
     }
-    let truly: Joints = std::array::from_fn(|i| joints[i] + params.errors.joints[i]);
+    let truly = joints.mapped(|joint, angle| angle + offsets[joint]);
     geometry.flange(&truly) * params.geometry.flange(joints).inverse()
 }
 

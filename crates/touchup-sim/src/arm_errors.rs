@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::random::{gauss, gauss_vector};
-use touchup_core::probing::arm::{Joints, UrGeometry};
+use touchup_core::probing::arm::{ArmGeometry, MOST_JOINTS, UrGeometry};
 
 /// True less told, and what no two touches have in common. Zero: the arm is what is told of it.
 ///
@@ -25,9 +25,9 @@ pub struct ArmErrors {
     pub turn: Vector3<f64>,
     /// place that the turn leaves where it is, m in O
     pub turned_about: Point3<f64>,
-    /// encoder offsets, rad
-    pub joints: Joints,
-    /// of d₁, a₂, a₃, d₄, d₅, d₆, m
+    /// encoder offsets, from the base to the wrist, rad
+    pub joints: [f64; MOST_JOINTS],
+    /// of d₁, a₂, a₃, d₄, d₅, d₆ of a UR, m
     pub lengths: [f64; 6],
     /// standard deviation of the ball's place along each axis from one approach to the next, m
     pub repeatability: f64,
@@ -83,7 +83,7 @@ impl ArmErrors {
         shift: Vector3::new(0.0, 0.0, 0.0),
         turn: Vector3::new(0.0, 0.0, 0.0),
         turned_about: Point3::new(0.0, 0.0, 0.0),
-        joints: [0.0; 6],
+        joints: [0.0; MOST_JOINTS],
         lengths: [0.0; 6],
         repeatability: 0.0,
         play: 0.0,
@@ -115,10 +115,11 @@ impl ArmErrors {
         turned * Translation3::from(-about)
     }
 
-    /// The true lengths of an arm.
-    pub(super) fn geometry(&self, told: &UrGeometry) -> UrGeometry {
+    /// An arm with its true lengths; of another than a UR they are as told.
+    pub(super) fn geometry(&self, told: &ArmGeometry) -> ArmGeometry {
+        let ArmGeometry::Ur(told) = told else { return told.clone() };
         let [d1, a2, a3, d4, d5, d6] = self.lengths;
-        UrGeometry {
+        let truly = UrGeometry {
             d1: told.d1 + d1,
             a2: told.a2 + a2,
             a3: told.a3 + a3,
@@ -126,6 +127,7 @@ impl ArmErrors {
             d5: told.d5 + d5,
             d6: told.d6 + d6,
             ..*told
-        }
+        };
+        truly.into()
     }
 }

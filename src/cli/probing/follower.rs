@@ -154,7 +154,7 @@ mod tests {
             pose_bt: Isometry3::identity(),
             wrench_b: nothing,
             raw_wrench_f: nothing,
-            joints: Default::default(),
+            joints: [0.0; 6].into(),
             safety: Safety::Normal,
         }
     }

@@ -196,7 +196,7 @@ impl SimulatedArm {
         std::thread::spawn(move || {
             let (plate, params) = (Plate::default(), ArmParams::default());
             let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-            let mut arm = SimArm::new(&plate, params, &start).unwrap();
+            let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
             for asked in asked {
                 match asked {
                     Asked::State(to) => drop(to.send(arm.next_state())),

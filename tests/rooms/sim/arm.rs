@@ -29,8 +29,8 @@ fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
     for friction in [0.0, 0.15, 0.4] {
         let plate = Plate::default();
         let (params, start) = quiet(0.1e-3);
-        let params = ArmParams { friction, ..params };
-        let mut arm = SimArm::new(&plate, params, &start).unwrap();
+        let params = ArmParams { friction, ..params.clone() };
+        let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
         let mut go = |linear: Vector3<f64>, seconds: f64| {
             let mut state = arm.next_state().unwrap();
             for _ in 0..(seconds / arm.period()) as usize {
@@ -56,8 +56,8 @@ fn an_arm_with_errors_is_where_they_put_it() {
     let plate = Plate::default();
     let (params, start) = quiet(5e-3);
     let place = params.pose_bo.inverse_transform_point(&Point3::from(start.translation.vector));
-    let ball = |errors: ArmErrors| SimArm::new(&plate, ArmParams { errors, ..params }, &start).unwrap().ball();
-    let joints = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let ball = |errors: ArmErrors| SimArm::new(&plate, ArmParams { errors, ..params.clone() }, &start).unwrap().ball();
+    let joints = [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 1e-3) * start.translation.vector;
     let expected = params.pose_bo.inverse_transform_point(&Point3::from(turned));
     assert!((ball(ArmErrors { joints, ..ArmErrors::NONE }) - expected).norm() < 1e-12);

@@ -36,7 +36,7 @@ impl Scene {
         let (robot, TipParams { radius: ball_radius, stiffness }) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
         let RobotSection { limits, touch, pattern, tool, .. } = robot;
         let cell = Cell {
-            geometry: UrGeometry::of(robot.model.name())?,
+            geometry: UrGeometry::of(robot.model.name())?.into(),
             pose_bo: self.scan_to_space.as_ref().map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
             pose_ft: robot.pose_ft(),
             tool: Tool { ball_radius, ..*tool },
@@ -171,7 +171,7 @@ impl RefineSection {
 /// A simulated arm of a cell; all that a scene does not name is as in [`ArmParams::default`].
 pub fn simulated_arm(cell: &Cell, params: &ProbeParams) -> ArmParams {
     ArmParams {
-        geometry: cell.geometry,
+        geometry: cell.geometry.clone(),
         pose_bo: cell.pose_bo,
         pose_ft: cell.pose_ft,
         radius: cell.tool.ball_radius,

@@ -67,7 +67,7 @@ mod tests {
         let (clock, _hand) = Clock::lock_step();
         let (plate, params) = (Plate::default(), ArmParams::default());
         let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-        let arm = || SimArm::new(&plate, params, &start).unwrap();
+        let arm = || SimArm::new(&plate, params.clone(), &start).unwrap();
         let (mut paced, mut free) = (Paced::new(clock, arm()), arm());
         for order in 0..500 {
             // one that is lost leaves the arm on a way of its own
@@ -88,7 +88,7 @@ mod tests {
         let (clock, hand) = Clock::lock_step();
         let (plate, params) = (Plate::default(), ArmParams::default());
         let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-        let mut paced = Paced::new(clock.clone(), SimArm::new(&plate, params, &start).unwrap());
+        let mut paced = Paced::new(clock.clone(), SimArm::new(&plate, params.clone(), &start).unwrap());
         let (begun, period) = (clock.now(), Duration::from_secs_f64(paced.period()));
         let mut next_at = || {
             paced.next_state().unwrap();

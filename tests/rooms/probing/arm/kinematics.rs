@@ -7,9 +7,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use touchup::probing::arm::{
-    Arm, Command, Joints, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, UrGeometry, find_onset,
-};
+use touchup::probing::arm::{Arm, Command, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, UrGeometry, find_onset};
 use touchup::sim::{ArmParams, Plate, SimArm, WEIGHTLESS};
 use touchup::stylus::Payload;
 
@@ -193,7 +191,7 @@ fn what_is_no_touch_is_refused() {
 }
 
 /// Denavit and Hartenberg's matrices, multiplied as in the book.
-fn by_matrices(arm: &UrGeometry, joints: &Joints) -> Matrix4<f64> {
+fn by_matrices(arm: &UrGeometry, joints: &[f64; 6]) -> Matrix4<f64> {
     let table = [
         (arm.d1, 0.0, PI / 2.0),
         (0.0, arm.a2, 0.0),
@@ -215,7 +213,7 @@ fn by_matrices(arm: &UrGeometry, joints: &Joints) -> Matrix4<f64> {
     })
 }
 
-fn joints() -> impl Strategy<Value = Joints> {
+fn joints() -> impl Strategy<Value = [f64; 6]> {
     prop::array::uniform6(-PI..PI)
 }
 
@@ -235,7 +233,7 @@ proptest! {
         let found = arm.inverse(&pose, &joints);
         prop_assert!((1..=8).contains(&found.len()));
         let turn = |a: f64, b: f64| (a - b + PI).rem_euclid(2.0 * PI) - PI;
-        let is_it = |other: &Joints| other.iter().zip(&joints).all(|(a, b)| turn(*a, *b).abs() < 1e-6);
+        let is_it = |other: &[f64; 6]| other.iter().zip(&joints).all(|(a, b)| turn(*a, *b).abs() < 1e-6);
         prop_assert!(found.iter().any(is_it), "{found:?}");
         for solution in &found {
             let error = pose.inv_mul(&arm.flange(solution));

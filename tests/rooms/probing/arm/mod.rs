@@ -1,3 +1,4 @@
 mod kinematics;
+mod serial_chain;
 mod touching;
 mod turned_slots;

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use touchup::features::{Feature, Kind, Measured};
 use touchup::probing::arm::{
     Arm, ArmError, ArmState, Command, LimitError, Limits, Narrower, Observer, OnsetVerdict, ProbeError, Safety,
-    StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, UNEXPECTED, UrGeometry, Watched,
+    StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, UNEXPECTED, Watched,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
@@ -81,7 +81,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
             let ball = params.radius;
             (down(&params, place), Box::new(move |p: &Point3<f64>| TOP + ball - p.z))
         };
-        let mut arm = SimArm::new(&plate, params, &at(&params, [16e-3, 36e-3, 30e-3])).unwrap();
+        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [16e-3, 36e-3, 30e-3])).unwrap();
         if is_wall {
             let mut onlooker = Onlooker;
             let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
@@ -177,7 +177,7 @@ fn a_hole_is_found_from_one_click_and_measured() {
         let touching = TouchParams { stiffness: params.stiffness, ..TouchParams::default() };
         let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
         let flag = Point3::new(x + off * angle.cos(), y + off * angle.sin(), TOP + rng.random_range(-0.5e-3..0.5e-3));
-        let mut arm = SimArm::new(&plate, params, &at(&params, [x, y, 30e-3])).unwrap();
+        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [x, y, 30e-3])).unwrap();
         let mut search = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
         let peak = explored(&mut arm, &params, &touching, &mut search);
         let found = search.found().unwrap();
@@ -206,7 +206,7 @@ fn a_hole_is_found_from_one_click_and_measured() {
 #[test]
 fn where_no_hole_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 8e-3, TOP);
     let mut search = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
@@ -216,7 +216,7 @@ fn where_no_hole_is_none_is_found() {
 #[test]
 fn where_nothing_is_that_is_the_answer() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let target = down(&params, [45e-3, 8e-3, 30e-3]);
     let record = touched(&mut arm, &TouchParams::default(), &target).unwrap();
     let TouchOutcome::Miss { travel } = record.outcome else { panic!("{:?}", record.outcome) };
@@ -228,7 +228,7 @@ fn where_nothing_is_that_is_the_answer() {
 #[test]
 fn an_obstacle_stops_it() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
     let inside = down(&params, [45e-3, 8e-3, TOP - 3e-3]);
     let error = touched(&mut arm, &TouchParams { link_speed: 10e-3, ..TouchParams::default() }, &inside).unwrap_err();
     let ProbeError::Obstacle { place_mm, force_n, .. } = error else { panic!("{error}") };
@@ -246,7 +246,7 @@ fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
     let plate = Plate::default();
     for (stiffness, leaves) in [(5e3, false), (15e3, false), (40e3, false), (15e3, true), (40e3, true)] {
         let params = ArmParams { stiffness, ..ArmParams::default() };
-        let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 40e-3])).unwrap();
+        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 40e-3])).unwrap();
         let touching = TouchParams { stiffness, link_speed: 0.25, ..TouchParams::default() };
         let limits = Limits { speed: 0.25, ..limits() };
         let mut world = Onlooker;
@@ -302,7 +302,7 @@ impl<F: FnMut(&mut ArmState)> Arm for Altered<'_, F> {
 #[test]
 fn a_force_with_the_other_sign_is_named_at_the_first_contact() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
+    let arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
     let mut turned = Altered { arm, alter: |state: &mut ArmState| state.wrench_b.force *= -1.0 };
     let mut world = Onlooker;
     let mut watched = Watched::new(&mut turned, limits(), &mut world);
@@ -322,19 +322,19 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
     let free = at(&params, [45e-3, 8e-3, 30e-3]);
     let mut world = Onlooker;
     let alter = |state: &mut ArmState| state.wrench_b.force.z += 7.5;
-    let mut pressed = Altered { arm: SimArm::new(&plate, params, &free).unwrap(), alter };
+    let mut pressed = Altered { arm: SimArm::new(&plate, params.clone(), &free).unwrap(), alter };
     let error = Watched::new(&mut pressed, limits(), &mut world).zero().unwrap_err();
     assert!(matches!(error, ProbeError::Loaded { force_n, most_n: 5.0, .. } if force_n > 6.0), "{error}");
     // somebody leans on it: 20 N/s
-    let arm = SimArm::new(&plate, params, &free).unwrap();
+    let arm = SimArm::new(&plate, params.clone(), &free).unwrap();
     let alter = |state: &mut ArmState| state.wrench_b.force.x += 20.0 * (state.stamp_ns % 1_000_000_000) as f64 * 1e-9;
     let mut leaned = Altered { arm, alter };
     let error = Watched::new(&mut leaned, Limits { tare: 50.0, ..limits() }, &mut world).zero().unwrap_err();
     assert!(matches!(error, ProbeError::Unsteady { change_n, .. } if change_n > 0.3), "{error}");
     // a free one is, also with twice its noise
     for seed in 0..50 {
-        let params = ArmParams { seed, force_noise: 0.3, ..params };
-        let mut arm = SimArm::new(&plate, params, &free).unwrap();
+        let params = ArmParams { seed, force_noise: 0.3, ..params.clone() };
+        let mut arm = SimArm::new(&plate, params.clone(), &free).unwrap();
         Watched::new(&mut arm, limits(), &mut world).zero().unwrap();
     }
 }
@@ -357,7 +357,7 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
         (ArmFault::ForceSpike(40.0), |e| matches!(e, ProbeError::Limit { error: LimitError::Force { .. }, .. })),
     ];
     for (fault, is_true) in is_true {
-        let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
+        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
         let at_s = 0.9;
         arm.fail_at(at_s, fault);
         let target = down(&params, [45e-3, 8e-3, 22e-3]);
@@ -391,7 +391,7 @@ fn an_arm_that_is_too_fast_or_whose_clock_goes_back_is_stopped() {
         ),
     ];
     for (alter, is_true) in faults {
-        let arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
+        let arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
         let (mut seen, mut told) = (0u32, 0);
         let alter = |state: &mut ArmState| {
             seen += 1;
@@ -431,7 +431,7 @@ impl Observer for Impatient {
 #[test]
 fn a_cancelled_touch_stops() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 25e-3])).unwrap();
     let mut impatient = Impatient { seen: 0 };
     let mut watched = Watched::new(&mut arm, limits(), &mut impatient);
     watched.zero().unwrap();
@@ -454,7 +454,7 @@ impl Arm for Creeping {
         let wrench_b = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
         let pose_bt = Isometry3::translation(x, 0.0, 0.1);
         let (joints, safety, raw_wrench_f) = ([0.0; 6], Safety::Normal, Wrench::default());
-        Ok(ArmState { stamp_ns: self.stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints, safety })
+        Ok(ArmState { stamp_ns: self.stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints: joints.into(), safety })
     }
 
     fn command(&mut self, _: &Command) -> Result<(), ArmError> {
@@ -489,7 +489,7 @@ fn an_arm_that_creeps_is_not_at_rest() {
 fn an_arm_turns_on_the_spot_with_limited_speed() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let start = at(&params, [45e-3, 8e-3, 60e-3]);
-    let mut arm = SimArm::new(&plate, params, &start).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
     let turned = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.7);
     let to = Isometry3::from_parts(start.translation, turned);
     let mut before = start.rotation;
@@ -512,7 +512,7 @@ fn an_arm_turns_on_the_spot_with_limited_speed() {
 fn a_slide_keeps_its_force() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     // on the top, beside the slot and short of the step
-    let mut arm = SimArm::new(&plate, params, &at(&params, [10e-3, 5e-3, TOP + 2e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [10e-3, 5e-3, TOP + 2e-3])).unwrap();
     arm.zero_sensor().unwrap();
     let press =
         |feed: f64| Command::Press { axis: -Vector3::z(), force: 5.0, feed: Vector3::new(feed, 0.0, 0.0), speed: 5e-3 };
@@ -553,8 +553,9 @@ fn places_that_cannot_be_are_refused_before_anything_moves() {
     let params = ArmParams::default();
     let limits = limits();
     let near = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
-    let check =
-        |pose: &Isometry3<f64>, limits: &Limits| limits.check_pose(&UrGeometry::UR5E, &params.pose_ft, pose, &near);
+    let check = |pose: &Isometry3<f64>, limits: &Limits| {
+        limits.check_pose(&params.geometry, &params.pose_ft, pose, &near.into())
+    };
     assert!(check(&at(&params, [45e-3, 8e-3, 25e-3]), &limits).is_ok());
     assert!(matches!(check(&at(&params, [0.5, 0.0, 0.0]), &limits), Err(LimitError::Workspace { .. })));
     assert!(matches!(check(&at(&params, [f64::NAN, 0.0, 0.0]), &limits), Err(LimitError::Workspace { .. })));
@@ -573,7 +574,7 @@ fn explored_from(kind: Kind, near: Point3<f64>, seed: u64, params: PatternParams
     let touching = TouchParams { stiffness: arm_params.stiffness, ..TouchParams::default() };
     let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
     let flag = near + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), rng.random_range(-0.5e-3..0.5e-3));
-    let mut arm = SimArm::new(&plate, arm_params, &at(&arm_params, [near.x, near.y, 30e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, arm_params.clone(), &at(&arm_params, [near.x, near.y, 30e-3])).unwrap();
     let mut search = Explorer::new(Some(kind), &flag, &Vector3::z_axis(), params).unwrap();
     let peak = explored(&mut arm, &arm_params, &touching, &mut search);
     let found = search.found().unwrap_or_else(|error| panic!("{kind:?} {flag}, seed {seed}: {error}"));
@@ -658,7 +659,7 @@ fn a_plane_is_measured() {
 #[test]
 fn where_no_edge_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
-    let mut arm = SimArm::new(&plate, params, &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 9e-3, TOP);
     let mut search = Explorer::new(Some(Kind::Edge), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);

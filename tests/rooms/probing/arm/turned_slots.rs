@@ -63,7 +63,7 @@ fn a_wall_met_at_a_flat_angle_is_a_contact_at_its_place() {
         let params = ArmParams::default();
         let touching = TouchParams { stiffness: params.stiffness, ..TouchParams::default() };
         let from = [19e-3, 14e-3, 9.8e-3];
-        let mut arm = SimArm::new(&plate, params, &at(&params, [from[0], from[1], 20e-3])).unwrap();
+        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [from[0], from[1], 20e-3])).unwrap();
         let direction = Unit::new_normalize(Vector3::new(cos, sin, 0.0));
         let target = TouchTarget { standoff_bt: at(&params, from), direction, search: 12e-3, expected: None };
         let record = touched(&mut arm, &touching, &target).unwrap();
@@ -92,7 +92,7 @@ fn a_slot_is_found_at_every_angle() {
             let (turn, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
             let flag = Point3::from(MIDDLE) + Vector3::new(off * f64::cos(turn), off * f64::sin(turn), 0.2e-3);
             let start = at(&params, [MIDDLE[0], MIDDLE[1], 30e-3]);
-            let mut arm = SimArm::new(&plate, params, &start).unwrap();
+            let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
             let mut search =
                 Explorer::new(Some(Kind::Slot), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
             explored(&mut arm, &params, &touching, &mut search);

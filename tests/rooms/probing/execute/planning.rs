@@ -497,13 +497,13 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         let middle = nalgebra::center(&low, &high);
         let base = Point3::new(-0.4, -0.1, 0.1);
         let pose_bo = Isometry3::translation(base.x - middle.x, base.y - middle.y, base.z - low.z);
-        let cell = Cell { pose_bo, geometry: UrGeometry::UR10E, ..cell() };
+        let cell = Cell { pose_bo, geometry: UrGeometry::UR10E.into(), ..cell() };
         let params = ProbeParams { pattern: PatternParams { budget: 12, ..params().pattern }, ..params() };
         let start = above(&cell, [middle.x, middle.y, high.z + 60e-3]);
         let faces: Vec<_> = mesh.faces().map(|(face, _)| mesh.triangle(face)).collect();
         let (triangles, world) = (Triangles::new(&mesh), StaticScan::new(mesh.clone()));
         let flange = start * cell.pose_ft.inverse();
-        let joints = cell.geometry.inverse(&flange, &[0.0; 6])[0];
+        let joints = cell.geometry.most_dexterous(&flange).unwrap();
         let now = ArmState {
             stamp_ns: 0,
             pose_bt: start,

@@ -117,7 +117,7 @@ fn an_unknown_region_is_slid_over_where_it_was_touched() {
 /// A straight slide over the top of the plate, at a height over it.
 fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>, f64) {
     let (plate, params, cell) = (Plate::default(), ArmParams::default(), cell());
-    let mut arm = SimArm::new(&plate, params, &start()).unwrap();
+    let mut arm = SimArm::new(&plate, params.clone(), &start()).unwrap();
     let stations = (0..=200).map(|at| {
         let share = f64::from(at) / 200.0;
         let place = [0, 1].map(|i| from[i] + (to[i] - from[i]) * share);

@@ -145,15 +145,14 @@ fn rms(errors: &[f64]) -> f64 {
 }
 
 /// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of 6 errors of one dimension over their
-/// deviation is 0.13 to 2.16; with 50 (`--full`) 0.001 below 24.7 and above 86.7, so 0.70 to 1.32. More dimensions scatter less. The errors of
-/// each feature are drawn apart.
+/// deviation is 0.13 to 2.16; more dimensions scatter less. With `--full` it is 50 errors, within what is asked of them, 0.8 to 1.25, and all
+/// are found. The errors of each feature are drawn apart.
 ///
-/// The lower bound is not one for directions: that a hole is perpendicular to its surface is believed within 0.02 rad, and those of the plate
-/// are so exactly. Some are not found: where places are off by some tenths of a millimetre the ball meets the part on its way out, and an edge
-/// is taken for a low one.
+/// With 6 the lower bound is not one for directions: that a hole is perpendicular to its surface is believed within 0.02 rad, and those of the
+/// plate are so exactly.
 #[test]
 fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
-    let (seeds, [least, most]) = (either(6, 50), either([0.13, 2.16], [0.70, 1.32]));
+    let (seeds, [least, most]) = (either(6, 50), either([0.13, 2.16], [0.8, 1.25]));
     let scan = plate_scan(1);
     let mut table = String::from("| feature | number | error over ±, rms | found |\n|---|---|---|---|\n");
     let mut wrong = Vec::new();
@@ -161,10 +160,7 @@ fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
         let results: Vec<_> = (1..=seeds).map(|seed| probed(drawn, apart + seed, &scan)).collect();
         let found: Vec<&Normalised> = results.iter().filter_map(|result| result.as_ref().ok()).collect();
         let missed: Vec<String> = results.iter().filter_map(|result| result.as_ref().err().cloned()).collect();
-        println!("{}", missed.join("\n"));
-        if missed.len() > either(1, 4) {
-            wrong.extend(missed);
-        }
+        wrong.extend(missed);
         let of = |number: fn(&Normalised, usize) -> f64, at| {
             rms(&found.iter().map(|one| number(one, at)).collect::<Vec<_>>())
         };
@@ -173,7 +169,7 @@ fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
         numbers.extend((0..drawn.sizes.len()).map(|at| (names[at], of(|one, at| one.2[at], at))));
         for (number, rms) in numbers {
             writeln!(table, "| {} | {number} | {rms:.2} | {} of {seeds} |", drawn.name, found.len()).unwrap();
-            let least = if number == "direction" { 0.0 } else { least };
+            let least = if number == "direction" { either(0.0, least) } else { least };
             if !(least..=most).contains(&rms) {
                 wrong.push(format!("{} {number}: {rms:.2}", drawn.name));
             }

@@ -5,7 +5,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::kinematics::Joints;
+use super::joints::Joints;
 use crate::stylus::{StampedPose, StampedWrench, Wrench};
 
 /// What an arm says of itself at one moment.
@@ -214,7 +214,7 @@ mod tests {
             pose_bt: Isometry3::from_parts(Vector3::new(0.4, 0.1, 0.2).into(), turn),
             wrench_b,
             raw_wrench_f: wrench_b,
-            joints: [0.0; 6],
+            joints: [0.0; 6].into(),
             safety: Safety::Normal,
         };
         let (pose, wrench) = state.as_probe(9);

@@ -10,10 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
-/// Joint angles from the base to the wrist, rad.
-pub type Joints = [f64; 6];
-
-/// Lengths of an arm; those that the DH parameters of a UR do not name are zero.
+/// Lengths of a UR; those that the DH parameters of a UR do not name are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UrGeometry {
     /// m
@@ -101,12 +98,12 @@ impl UrGeometry {
     }
 
     /// Pose of the flange in the base B.
-    pub fn flange(&self, joints: &Joints) -> Isometry3<f64> {
+    pub fn flange(&self, joints: &[f64; 6]) -> Isometry3<f64> {
         self.link_poses(joints)[5]
     }
 
     /// Pose of the end of each link in B, in the axes of the joint there; the last is the flange.
-    pub(super) fn link_poses(&self, joints: &Joints) -> [Isometry3<f64>; 6] {
+    pub(super) fn link_poses(&self, joints: &[f64; 6]) -> [Isometry3<f64>; 6] {
         let (links, mut pose) = (self.links(), Isometry3::identity());
         std::array::from_fn(|i| {
             pose *= step(&links[i], joints[i]);
@@ -115,7 +112,7 @@ impl UrGeometry {
     }
 
     /// Velocity of the flange by those of the joints: three rows of m/s, three of rad/s, in B.
-    pub fn jacobian(&self, joints: &Joints) -> Matrix6<f64> {
+    pub fn jacobian(&self, joints: &[f64; 6]) -> Matrix6<f64> {
         let end = self.flange(joints).translation.vector;
         let (mut jacobian, mut pose) = (Matrix6::zeros(), Isometry3::identity());
         for (column, (link, angle)) in self.links().iter().zip(joints).enumerate() {
@@ -131,16 +128,16 @@ impl UrGeometry {
     /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with lengths in
     /// units of upper arm and forearm together. Zero where it is stretched, where the wrist is above the shoulder, and where
     /// axes 4 and 6 are parallel.
-    pub fn dexterity(&self, joints: &Joints) -> f64 {
+    pub fn dexterity(&self, joints: &[f64; 6]) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / (self.a2.abs() + self.a3.abs()));
         jacobian.singular_values().min()
     }
 
-    /// All joint angles, within (−π, π], that bring the flange to a pose in B: eight at most, none out of reach.
+    /// All joint angles in rad, from the base to the wrist, within (−π, π], that bring the flange to a pose in B: eight at most, none out of reach.
     ///
     /// Where axes 4 and 6 are parallel only their sum is determined; there the sixth joint stays where `near` has it.
-    pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Vec<Joints> {
+    pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &[f64; 6]) -> Vec<[f64; 6]> {
         let mut found = Vec::with_capacity(8);
         for q1 in self.shoulders(pose_bf) {
             for (q5, q6) in self.wrists(pose_bf, q1, near[5]) {
@@ -183,7 +180,7 @@ impl UrGeometry {
     }
 
     /// Second to fourth joint: the triangle of upper arm and forearm.
-    fn elbows(&self, pose_bf: &Isometry3<f64>, [q1, q5, q6]: [f64; 3], found: &mut Vec<Joints>) {
+    fn elbows(&self, pose_bf: &Isometry3<f64>, [q1, q5, q6]: [f64; 3], found: &mut Vec<[f64; 6]>) {
         let links = self.links();
         let first = step(&links[0], q1);
         let last = step(&links[4], q5) * step(&links[5], q6);

@@ -1,6 +1,6 @@
 //! The limits of an arm, which no request can exceed.
 
-use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -8,8 +8,10 @@ use crate::parameters;
 use crate::parameters::SettingError;
 
 use super::bodies::{ArmBodies, Link};
+use super::geometry::ArmGeometry;
 use super::interface::ArmState;
-use super::kinematics::{Joints, UrGeometry};
+use super::joints::Joints;
+use super::serial_chain::Unreached;
 
 parameters! {
     /// Bounds of every motion, from the configuration alone. A request may ask for less ([`Self::narrowed`]), never for more.
@@ -70,14 +72,14 @@ parameters! {
         time: f64 = 600.0, "time_s" [S, 1, 86400];
         /// How far the arm stays from singular poses: smallest singular value of its Jacobian, lengths over its reach.
         ///
-        /// The least [`UrGeometry::dexterity`] of any pose.
+        /// The least [`ArmGeometry::dexterity`] of any pose.
         dexterity: f64 = 0.02, "least_dexterity" [ONE, 0, 1];
     }
     check Limits::is_box;
 }
 
 /// Which bound would be left, and by how much.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LimitError {
     /// Outside the box.
     #[error("({:.1} {:.1} {:.1}) mm is outside the workspace of the arm", place_mm[0], place_mm[1], place_mm[2])]
@@ -90,6 +92,30 @@ pub enum LimitError {
     Reach {
         /// of the tip in B, mm
         place_mm: [f64; 3],
+    },
+    /// Only joint angles beyond the range of a joint lead there.
+    #[error(
+        "the arm reaches ({:.1} {:.1} {:.1}) mm with this orientation only with its joint {joint} outside of {low_deg:.0}° to {high_deg:.0}°: \
+         turn the part, or begin with the arm in another configuration",
+        place_mm[0], place_mm[1], place_mm[2]
+    )]
+    JointRange {
+        /// of the tip in B, mm
+        place_mm: [f64; 3],
+        /// by name
+        joint: Arc<str>,
+        /// °
+        low_deg: f64,
+        /// °
+        high_deg: f64,
+    },
+    /// Another arm than the one that is planned with.
+    #[error("the arm has {joints} joints, the one of robot.model has {expected}: name the arm that is there")]
+    OtherArm {
+        /// of the arm
+        joints: usize,
+        /// of its model
+        expected: usize,
     },
     /// Too near to a singularity.
     #[error("at ({:.1} {:.1} {:.1}) mm the arm is nearly stuck: dexterity {dexterity:.3}, {least:.3} is the least",
@@ -270,22 +296,27 @@ impl Limits {
     /// - `pose_ft`: the tip in the flange.
     ///
     /// # Errors
-    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::Singular`], [`LimitError::OwnLinks`], [`LimitError::ArmBox`].
+    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::JointRange`], [`LimitError::OtherArm`], [`LimitError::Singular`],
+    /// [`LimitError::OwnLinks`], [`LimitError::ArmBox`].
     pub fn check_pose(
         &self,
-        geometry: &UrGeometry,
+        geometry: &ArmGeometry,
         pose_ft: &Isometry3<f64>,
         pose_bt: &Isometry3<f64>,
         near: &Joints,
     ) -> Result<Joints, LimitError> {
         let place = pose_bt.translation.vector;
         self.check_place(&place)?;
+        if near.len() != geometry.joint_count() {
+            return Err(LimitError::OtherArm { joints: near.len(), expected: geometry.joint_count() });
+        }
         let place_mm = millimetres(&place);
-        let solutions = geometry.inverse(&(pose_bt * pose_ft.inverse()), near);
-        let unwound = solutions.into_iter().map(|joints| unwound(&joints, near));
-        let in_range = unwound.filter(|joints| joints.iter().all(|angle| angle.abs() <= JOINT_RANGE));
-        let nearest = in_range.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
-        let joints = nearest.ok_or(LimitError::Reach { place_mm })?;
+        let joints = geometry.nearest(&(pose_bt * pose_ft.inverse()), near).map_err(|unreached| match unreached {
+            Unreached::Pose => LimitError::Reach { place_mm },
+            Unreached::Range { joint, range: [low, high] } => {
+                LimitError::JointRange { place_mm, joint, low_deg: low.to_degrees(), high_deg: high.to_degrees() }
+            }
+        })?;
         let dexterity = geometry.dexterity(&joints);
         if dexterity < self.dexterity {
             return Err(LimitError::Singular { place_mm, dexterity, least: self.dexterity });
@@ -295,13 +326,13 @@ impl Limits {
     }
 
     /// Whether its links keep clear of each other, and in the box of the arm.
-    fn check_links(&self, bodies: &ArmBodies, place_mm: [f64; 3]) -> Result<(), LimitError> {
+    fn check_links(&self, bodies: &ArmBodies<'_>, place_mm: [f64; 3]) -> Result<(), LimitError> {
         let (link, other, gap) = bodies.nearest_pair();
         if gap < LINK_GAP {
             return Err(LimitError::OwnLinks { place_mm, link, other, gap_mm: gap * 1e3, least_mm: LINK_GAP * 1e3 });
         }
         // the base is bolted to what limits the others
-        for (link, capsule) in bodies.links().filter(|(link, _)| *link != Link::Base) {
+        for (link, capsule) in bodies.links().filter(|(link, _)| **link != Link::Base) {
             let beyond = |end: &Point3<f64>| {
                 let low = self.arm_lowest.map(|low| (low - end).max() + capsule.radius);
                 let high = self.arm_highest.map(|high| (end - high).max() + capsule.radius);
@@ -309,7 +340,7 @@ impl Limits {
             };
             let by = capsule.ends.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max);
             if by > 0.0 {
-                return Err(LimitError::ArmBox { place_mm, link, by_mm: by * 1e3 });
+                return Err(LimitError::ArmBox { place_mm, link: link.clone(), by_mm: by * 1e3 });
             }
         }
         Ok(())
@@ -332,20 +363,8 @@ impl Limits {
     }
 }
 
-/// A joint of a UR turns by no more from its zero, rad.
-const JOINT_RANGE: f64 = TAU;
 /// Links keep so far from each other, m: the radius of a probe, and what capsules leave out.
 const LINK_GAP: f64 = 10e-3;
-
-/// The same angles, each within half a turn of another.
-fn unwound(joints: &Joints, near: &Joints) -> Joints {
-    std::array::from_fn(|i| joints[i] + TAU * ((near[i] - joints[i]) / TAU).round())
-}
-
-/// By how far the joint turns that turns most, rad.
-pub(crate) fn largest_turn(from: &Joints, to: &Joints) -> f64 {
-    from.iter().zip(to).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
 
 pub(crate) fn millimetres(place: &Vector3<f64>) -> [f64; 3] {
     (place * 1e3).into()

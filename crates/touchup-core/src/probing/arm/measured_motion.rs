@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 
 use super::interface::ArmState;
-use super::kinematics::Joints;
+use super::joints::Joints;
 use super::limits::{LimitError, Limits};
 
 /// Speeds are means over this many periods: the noise of a place is 1 mm/s then.
@@ -38,7 +38,7 @@ impl MeasuredMotion {
         if speed.is_nan() || speed > limits.speed * OVER.0 + OVER.1 {
             return Err(LimitError::Speed { mm_per_s: speed * 1e3, limit_mm_per_s: limits.speed * 1e3 });
         }
-        for (joint, (now, before)) in (1..).zip(state.joints.iter().zip(joints)) {
+        for (joint, (now, before)) in (1..).zip(state.joints.iter().zip(joints.iter())) {
             let turning = (now - before).abs() / seconds;
             if turning.is_nan() || turning > limits.joint_speed {
                 let (deg_per_s, limit_deg_per_s) = (turning.to_degrees(), limits.joint_speed.to_degrees());
@@ -73,7 +73,7 @@ mod tests {
                 pose_bt: Isometry3::translation(0.3, -speed * seconds, 0.1),
                 wrench_b: nothing,
                 raw_wrench_f: nothing,
-                joints: [0.0, -1.6, 1.6 + turning * seconds, -1.6, -1.6, 0.0],
+                joints: [0.0, -1.6, 1.6 + turning * seconds, -1.6, -1.6, 0.0].into(),
                 safety: Safety::Normal,
             };
             if let Err(error) = motion.take(&state, &limits) {

@@ -5,22 +5,31 @@
 //! constant force and follows a path.
 
 mod bodies;
+mod capsule;
+mod geometry;
 mod interface;
+mod joints;
 mod kinematics;
 mod limits;
 mod measured_motion;
 mod onset;
+mod serial_chain;
 mod sliding;
 mod touch_params;
 mod touching;
 mod watched;
 
-pub use bodies::{ArmBodies, Capsule, Link};
+pub use bodies::{ArmBodies, Link};
+pub use capsule::Capsule;
+pub use geometry::ArmGeometry;
 pub use interface::{Arm, ArmError, ArmState, Command, Safety};
-pub use kinematics::{Joints, UrGeometry};
+pub(crate) use joints::largest_turn;
+pub use joints::{Joints, MOST_JOINTS};
+pub use kinematics::UrGeometry;
+pub(crate) use limits::millimetres;
 pub use limits::{LimitError, Limits, Narrower};
-pub(crate) use limits::{largest_turn, millimetres};
 pub use onset::{Onset, OnsetError, OnsetParams, OnsetVerdict, TouchMoment, find_onset};
+pub use serial_chain::{ChainError, ChainJoint, ChainLink, Jacobian, SerialChain, Unreached};
 pub use sliding::{SlideEnding, SlideRecord, SlideTarget};
 pub use touch_params::{CRAWL, TouchParams, UNEXPECTED};
 pub use touching::{TouchOutcome, TouchRecord, TouchTarget};

@@ -5,13 +5,13 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use super::links::Tool;
 use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
-use crate::probing::arm::UrGeometry;
+use crate::probing::arm::ArmGeometry;
 
 /// A robot cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
     /// of the arm
-    pub geometry: UrGeometry,
+    pub geometry: ArmGeometry,
     /// of the part in the base: maps O to B
     pub pose_bo: Isometry3<f64>,
     /// of the tip in the flange: maps T to the flange; z of T from the tip to the handle

@@ -7,7 +7,7 @@ use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
 use super::route::{FreeSpace, ToolState};
 use super::world::{World, distance};
-use crate::probing::arm::{ArmState, Joints, LimitError, Safety};
+use crate::probing::arm::{ArmState, LimitError, Safety};
 use crate::probing::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
 use crate::stylus::Wrench;
 
@@ -47,16 +47,11 @@ pub struct Plan {
     pub held_back: Vec<HeldBack>,
 }
 
-/// About this configuration the arm is folded, rad: joints are chosen within half a turn of it.
-const FOLDED: Joints = [0.0, -1.6, 1.6, -1.6, -1.6, 0.0];
-
 impl Cell {
     /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that leaves it most room to move; for
     /// a plan without an arm. `None` where it does not reach.
     pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
-        let solutions = self.geometry.inverse(&(pose_bt * self.pose_ft.inverse()), &FOLDED);
-        let dexterity = |joints: &Joints| self.geometry.dexterity(joints);
-        let joints = solutions.into_iter().max_by(|a, b| dexterity(a).total_cmp(&dexterity(b)))?;
+        let joints = self.geometry.most_dexterous(&(pose_bt * self.pose_ft.inverse()))?;
         let nothing = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
         let (wrench_b, raw_wrench_f) = (nothing, nothing);
         Some(ArmState { stamp_ns: 0, pose_bt: *pose_bt, wrench_b, raw_wrench_f, joints, safety: Safety::Normal })

@@ -72,7 +72,7 @@ impl FreeSpace<'_> {
         match links.find(|(_, capsule)| self.is_at_part(capsule)) {
             Some((link, _)) => {
                 let place_mm = millimetres(&pose_bt.translation.vector);
-                Err(LimitError::Part { place_mm, link, least_mm: PART_GAP * 1e3 })
+                Err(LimitError::Part { place_mm, link: link.clone(), least_mm: PART_GAP * 1e3 })
             }
             None => Ok(joints),
         }
@@ -203,7 +203,7 @@ mod tests {
     fn cell() -> Cell {
         let down = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
         let pose_ft = Isometry3::from_parts(nalgebra::Vector3::new(0.0, 0.0, 0.15).into(), down);
-        Cell { geometry: UrGeometry::UR5E, pose_bo: Isometry3::identity(), pose_ft, tool: Tool::default() }
+        Cell { geometry: UrGeometry::UR5E.into(), pose_bo: Isometry3::identity(), pose_ft, tool: Tool::default() }
     }
 
     fn wide() -> Limits {
@@ -298,13 +298,8 @@ mod tests {
             let count = ((to - from).norm() / 1e-3).ceil();
             let mut joints = rest.joints;
             for step in 1..=count as usize {
-                let solutions = cell.geometry.inverse(&flange(step as f64 / count), &joints);
-                let turn = |a: &Joints| {
-                    let turns = a.iter().zip(&joints).map(|(a, b)| (a - b).sin().atan2((a - b).cos()).abs());
-                    turns.fold(0.0, f64::max)
-                };
-                let next = solutions.into_iter().min_by(|a, b| turn(a).total_cmp(&turn(b)));
-                let far = next.map_or(f64::INFINITY, |next| turn(&next));
+                let next = cell.geometry.nearest(&flange(step as f64 / count), &joints);
+                let far = next.as_ref().map_or(f64::INFINITY, |next| largest_turn(next, &joints));
                 prop_assert!(far < 0.1, "{far} rad at {step} of {count}");
                 joints = next.unwrap();
             }

@@ -1,0 +1,70 @@
+//! The joint angles of an arm.
+
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+
+/// An arm has at most so many joints.
+pub const MOST_JOINTS: usize = 8;
+
+/// Joint angles from the base to the wrist, rad; [`MOST_JOINTS`] at most, kept in place.
+#[derive(Clone, Copy)]
+pub struct Joints {
+    /// zero from `count` on
+    angles: [f64; MOST_JOINTS],
+    count: usize,
+}
+
+impl Joints {
+    /// The angles of so many joints; `None` for more than [`MOST_JOINTS`].
+    pub fn of(angles: &[f64]) -> Option<Self> {
+        let mut joints = Self { angles: [0.0; MOST_JOINTS], count: angles.len() };
+        joints.angles.get_mut(..angles.len())?.copy_from_slice(angles);
+        Some(joints)
+    }
+
+    /// Each angle changed by its number, from 0 on at the base.
+    pub fn mapped(mut self, mut angle: impl FnMut(usize, f64) -> f64) -> Self {
+        self.iter_mut().enumerate().for_each(|(joint, it)| *it = angle(joint, *it));
+        self
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for Joints {
+    fn from(of: [f64; N]) -> Self {
+        const { assert!(N <= MOST_JOINTS, "no arm has so many joints") };
+        let mut angles = [0.0; MOST_JOINTS];
+        angles[..N].copy_from_slice(&of);
+        Self { angles, count: N }
+    }
+}
+
+impl Deref for Joints {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.angles[..self.count]
+    }
+}
+
+impl DerefMut for Joints {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.angles[..self.count]
+    }
+}
+
+impl PartialEq for Joints {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl fmt::Debug for Joints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (**self).fmt(f)
+    }
+}
+
+/// By how far the joint turns that turns most, rad.
+pub(crate) fn largest_turn(from: &Joints, to: &Joints) -> f64 {
+    from.iter().zip(to.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
