@@ -4,22 +4,21 @@
 //!     [--payload KG,X,Y,Z]
 //!
 //! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses and watches is modelled, not
-//! copied. Lines on stdin make faults: drop, undash, mute, silent, deaf, stuck, hung, pause, resume, open, shut, unplug, die,
-//! protective, operator, release, halt, off, local, spike N, mend, mark TEXT. It ends when stdin does.
+//! copied. Lines on stdin make faults: drop, undash, mute, silent, deaf, stuck, hung, tired, late states MS, late orders MS, rate HZ,
+//! slider PERCENT, reduced, full, watchdog counts, pause, resume, open, shut, unplug, die, protective, operator, release, halt, off,
+//! local, spike N, drift N_PER_S, noise N, payload KG, raise MM, mend, mark TEXT. It ends when stdin does.
 //!
 //! It has a clock of its own, in lock step with its client: while a program of the client plays, a period passes when the client has
 //! sent its next order, so a machine that is late changes nothing. No period is shorter than on a robot; without a program the clock
 //! is that of the machine. A line `run MS` lets so much time pass whatever the client says. States, motion, safety, watchdog and
 //! record go by this clock. Each line is repeated on stdout when it has been done.
 
-mod body;
-mod controller;
 mod dashboard;
-mod record;
+mod model;
 mod rtde;
 
 use std::io::{BufRead, BufReader, stdin};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::thread;
@@ -30,8 +29,11 @@ use nalgebra::{Point3, Vector3};
 use touchup::sim::{ArmParams, MeshSurface, Plate, WEIGHTLESS};
 use touchup::stylus::Payload;
 
-use body::{Body, PERIOD};
-use controller::{Controller, Safety};
+use model::body::{Body, PERIOD};
+use model::controller::Controller;
+use model::panel::happen;
+use model::record::Record;
+use rtde::Stream;
 
 const DASHBOARD: u16 = 29999;
 const SCRIPT: u16 = 30003;
@@ -90,19 +92,20 @@ fn main() -> anyhow::Result<()> {
     let mesh = Plate::default().mesh(CHORD)?;
     let surface = MeshSurface::new(&mesh)?;
     let body = Body::new(&surface, ArmParams { payload, ..ArmParams::default() }, start)?;
-    let controller = Mutex::new(Controller::new(body, version, record::Record::new(record.as_deref())?));
+    let controller = Controller::new(body, version, Record::new(record.as_deref())?);
+    let served = Mutex::new(Served { controller, streams: Vec::new(), sockets: Vec::new() });
     let listen = |port| TcpListener::bind((address.as_str(), port)).with_context(|| format!("{address}:{port}"));
     let (rtde, dashboard, script) = (listen(RTDE)?, listen(DASHBOARD)?, listen(SCRIPT)?);
     println!("ready");
     thread::scope(|scope| {
-        let (controller, address) = (&controller, &address);
-        scope.spawn(move || accept(rtde, controller, |socket, number| rtde::serve(socket, number, controller)));
-        scope.spawn(move || accept(dashboard, controller, |socket, _| dashboard::serve(socket, controller)));
-        scope.spawn(move || accept(script, controller, |socket, _| take_programs(socket, controller)));
+        let (served, address) = (&served, &address);
+        scope.spawn(move || accept(rtde, served, |socket, number| rtde::serve(socket, number, served)));
+        scope.spawn(move || accept(dashboard, served, |socket, _| dashboard::serve(socket, served)));
+        scope.spawn(move || accept(script, served, |socket, _| take_programs(socket, served)));
         scope.spawn(move || {
             for line in stdin().lines().map_while(Result::ok) {
-                if let Ok(mut controller) = controller.lock() {
-                    fail(&mut controller, &line);
+                if let Ok(mut served) = served.lock() {
+                    served.happen(&line);
                 }
                 println!("{line}");
             }
@@ -115,29 +118,25 @@ fn main() -> anyhow::Result<()> {
         loop {
             // a machine that was late is late for good: a period is never made up for
             thread::sleep((last + period).saturating_duration_since(Instant::now()).max(LOOK));
-            let Ok(mut controller) = controller.lock() else { continue };
-            if controller.may_tick() {
+            let Ok(mut served) = served.lock() else { continue };
+            if served.controller.may_tick() {
                 last = Instant::now();
-                controller.tick();
+                served.tick();
             }
         }
     })
 }
 
 /// Serves each client on a thread of its own.
-fn accept(
-    listener: TcpListener,
-    controller: &Mutex<Controller>,
-    serve: impl Fn(TcpStream, u64) -> anyhow::Result<()> + Sync,
-) {
+fn accept(listener: TcpListener, served: &Mutex<Served>, serve: impl Fn(TcpStream, u64) -> anyhow::Result<()> + Sync) {
     thread::scope(|scope| {
         for (number, socket) in (0..).zip(listener.incoming()) {
-            let (Ok(socket), Ok(mut controller)) = (socket, controller.lock()) else { continue };
+            let (Ok(socket), Ok(mut served)) = (socket, served.lock()) else { continue };
             let Ok(copy) = socket.try_clone() else { continue };
-            if controller.faults.is_dead {
+            if served.controller.faults.is_dead {
                 continue;
             }
-            controller.sockets.push(copy);
+            served.sockets.push(copy);
             let serve = &serve;
             // small packets, each wanted at once; a client that goes in the middle of an answer is no matter
             scope.spawn(move || socket.set_nodelay(true).is_ok_and(|()| serve(socket, number).is_ok()));
@@ -146,59 +145,53 @@ fn accept(
 }
 
 /// A program ends with a line `end`.
-fn take_programs(socket: TcpStream, controller: &Mutex<Controller>) -> anyhow::Result<()> {
+fn take_programs(socket: TcpStream, served: &Mutex<Served>) -> anyhow::Result<()> {
     let mut program = String::new();
     for line in BufReader::new(socket).lines() {
         let line = line?;
         program += &line;
         program.push('\n');
         if line == "end" {
-            let mut controller = controller.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
-            controller.load(&std::mem::take(&mut program));
+            let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+            served.controller.load(&std::mem::take(&mut program));
         }
     }
     Ok(())
 }
 
-/// What a line on stdin asks for.
-fn fail(controller: &mut Controller, line: &str) {
-    controller.record.event(line);
-    match line.split_whitespace().collect::<Vec<_>>()[..] {
-        ["drop"] => controller.cut(&[RTDE]),
-        ["silent"] => controller.faults.is_silent = true,
-        ["deaf"] => controller.faults.is_deaf = true,
-        ["stuck"] => controller.faults.is_stuck = true,
-        ["hung"] => controller.faults.is_hung = true,
-        ["mute"] => controller.faults.is_mute = true,
-        ["pause"] => controller.pause("at the panel"),
-        ["resume"] => controller.resume(),
-        ["open"] => {
-            controller.safety = Safety::Safeguard;
-            controller.pause("a door is open");
+/// The controller with its connections.
+struct Served<'a> {
+    controller: Controller<'a>,
+    streams: Vec<Stream>,
+    /// all of them, of all ports
+    sockets: Vec<TcpStream>,
+}
+
+impl Served<'_> {
+    fn tick(&mut self) {
+        self.controller.tick();
+        while let Some(states) = self.controller.sent() {
+            self.streams.retain_mut(|stream| stream.send(&states));
         }
-        // with the automatic resume that a cell may have
-        ["shut"] => {
-            controller.safety = Safety::Normal;
-            controller.resume();
+    }
+
+    /// What a line on stdin asks for.
+    fn happen(&mut self, line: &str) {
+        happen(&mut self.controller, line);
+        match line {
+            "drop" => self.cut(&[RTDE]),
+            "undash" => self.cut(&[DASHBOARD]),
+            "die" => self.cut(&[RTDE, DASHBOARD, SCRIPT]),
+            _ => {}
         }
-        ["undash"] => controller.cut(&[DASHBOARD]),
-        ["unplug"] => controller.faults.is_unplugged = true,
-        ["die"] => {
-            controller.faults.is_dead = true;
-            controller.cut(&[RTDE, DASHBOARD, SCRIPT]);
-            // without power the brakes close
-            controller.stop_program("no power");
+    }
+
+    /// Ends all connections that are there now.
+    fn cut(&mut self, ports: &[u16]) {
+        let is_cut = |socket: &TcpStream| socket.local_addr().is_ok_and(|own| ports.contains(&own.port()));
+        for socket in self.sockets.extract_if(.., |socket| is_cut(socket)) {
+            // one that has ended already is as good
+            let _ = socket.shutdown(Shutdown::Both);
         }
-        ["protective"] => controller.stop_for(Safety::Protective, "a safety plane"),
-        ["operator"] => controller.stop_for(Safety::Emergency, "the button"),
-        ["release"] => controller.safety = Safety::Normal,
-        ["off"] => controller.is_powered = false,
-        ["local"] => controller.is_remote = false,
-        ["halt"] => controller.stop_program("at the panel"),
-        ["run", ms] => controller.grant(ms.parse().unwrap_or(0.0) * 1e-3),
-        ["spike", force] => controller.body.hit(force.parse().unwrap_or(0.0)),
-        ["mend", ..] => controller.faults = Default::default(),
-        ["mark", ..] => {}
-        _ => eprintln!("ur_controller: {line}: unknown"),
     }
 }

@@ -4,7 +4,9 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::Mutex;
 
-use crate::controller::{Controller, Safety};
+use crate::Served;
+use crate::model::controller::{Controller, Written};
+use crate::model::states::States;
 
 const OUTPUTS: u8 = b'O';
 const INPUTS: u8 = b'I';
@@ -20,7 +22,7 @@ impl Stream {
     /// Whether the client is still there.
     pub fn send(&mut self, states: &States) -> bool {
         let mut body = vec![1];
-        self.names.iter().filter_map(|name| states.value(name)).for_each(|(_, bytes)| body.extend(bytes));
+        self.names.iter().filter_map(|name| value(states, name)).for_each(|(_, bytes)| body.extend(bytes));
         self.socket.write_all(&packet(DATA, &body)).is_ok()
     }
 }
@@ -33,71 +35,30 @@ fn packet(kind: u8, body: &[u8]) -> Vec<u8> {
     packet
 }
 
-/// All outputs, at one moment.
-pub struct States {
-    time: f64,
-    q: [f64; 6],
-    pose: [f64; 6],
-    speed: [f64; 6],
-    force: [f64; 6],
-    raw: [f64; 6],
-    safety_bits: u32,
-    is_playing: bool,
-    is_paused: bool,
-    ints: [i32; 48],
-    doubles: [f64; 48],
-}
-
-impl States {
-    pub fn read(controller: &mut Controller) -> Self {
-        let pose = controller.body.read_pose();
-        let (place, turn) = (pose.translation.vector, pose.rotation.scaled_axis());
-        let ([linear, angular], (force, [raw, torque])) = (controller.body.velocity(), controller.body.read_wrenches());
-        let six = |a: nalgebra::Vector3<f64>, b: nalgebra::Vector3<f64>| [a.x, a.y, a.z, b.x, b.y, b.z];
-        Self {
-            time: controller.body.time,
-            q: std::array::from_fn(|joint| controller.body.joints[joint]),
-            pose: six(place, turn),
-            speed: six(linear, angular),
-            force: six(force, nalgebra::Vector3::zeros()),
-            raw: six(raw, torque),
-            safety_bits: match controller.safety {
-                Safety::Normal => 1,
-                Safety::Protective => 1 << 2 | 1 << 10,
-                Safety::Safeguard => 1 << 4 | 1 << 10,
-                Safety::Emergency => 1 << 6 | 1 << 7 | 1 << 10,
-            },
-            is_playing: controller.is_playing(),
-            is_paused: controller.is_paused(),
-            ints: controller.ints_out,
-            doubles: controller.doubles_out,
-        }
-    }
-
-    /// Type and bytes of a variable; `None`: unknown here.
-    fn value(&self, name: &str) -> Option<(&'static str, Vec<u8>)> {
-        let six = |values: &[f64; 6]| ("VECTOR6D", values.iter().flat_map(|v| v.to_be_bytes()).collect());
-        let unsigned = |value: u32| ("UINT32", value.to_be_bytes().to_vec());
-        let register = |prefix: &str| name.strip_prefix(prefix)?.parse::<usize>().ok().filter(|i| *i < 48);
-        Some(match name {
-            "timestamp" => ("DOUBLE", self.time.to_be_bytes().to_vec()),
-            "actual_q" => six(&self.q),
-            "actual_TCP_pose" => six(&self.pose),
-            "actual_TCP_speed" => six(&self.speed),
-            "actual_TCP_force" => six(&self.force),
-            "ft_raw_wrench" => six(&self.raw),
-            "safety_status_bits" => unsigned(self.safety_bits),
-            "robot_status_bits" => unsigned(1 | u32::from(self.is_playing) << 1),
-            "runtime_state" if self.is_paused => unsigned(4),
-            "runtime_state" => unsigned(if self.is_playing { 2 } else { 1 }),
-            "robot_mode" => ("INT32", 7i32.to_be_bytes().to_vec()),
-            _ => match (register("output_int_register_"), register("output_double_register_")) {
-                (Some(at), _) => ("INT32", self.ints[at].to_be_bytes().to_vec()),
-                (_, Some(at)) => ("DOUBLE", self.doubles[at].to_be_bytes().to_vec()),
-                _ => return None,
-            },
-        })
-    }
+/// Type and bytes of a variable; `None`: unknown here.
+fn value(states: &States, name: &str) -> Option<(&'static str, Vec<u8>)> {
+    let six = |values: &[f64; 6]| ("VECTOR6D", values.iter().flat_map(|v| v.to_be_bytes()).collect());
+    let unsigned = |value: u32| ("UINT32", value.to_be_bytes().to_vec());
+    let register = |prefix: &str| name.strip_prefix(prefix)?.parse::<usize>().ok().filter(|i| *i < 48);
+    Some(match name {
+        "timestamp" => ("DOUBLE", states.time.to_be_bytes().to_vec()),
+        "actual_q" => six(&states.q),
+        "actual_TCP_pose" => six(&states.pose),
+        "actual_TCP_speed" => six(&states.speed),
+        "actual_TCP_force" => six(&states.force),
+        "ft_raw_wrench" => six(&states.raw),
+        "safety_status_bits" => unsigned(states.safety_bits),
+        "robot_status_bits" => unsigned(1 | u32::from(states.is_playing) << 1),
+        "runtime_state" if states.is_paused => unsigned(4),
+        "runtime_state" => unsigned(if states.is_playing { 2 } else { 1 }),
+        "target_speed_fraction" => ("DOUBLE", states.speed_fraction.to_be_bytes().to_vec()),
+        "robot_mode" => ("INT32", 7i32.to_be_bytes().to_vec()),
+        _ => match (register("output_int_register_"), register("output_double_register_")) {
+            (Some(at), _) => ("INT32", states.ints[at].to_be_bytes().to_vec()),
+            (_, Some(at)) => ("DOUBLE", states.doubles[at].to_be_bytes().to_vec()),
+            _ => return None,
+        },
+    })
 }
 
 /// A register that a client may write.
@@ -121,7 +82,7 @@ impl Input {
 }
 
 /// One client, until it goes.
-pub fn serve(mut socket: TcpStream, number: u64, controller: &Mutex<Controller>) -> anyhow::Result<()> {
+pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyhow::Result<()> {
     let (mut names, mut recipes): (Vec<String>, Vec<Vec<Input>>) = (Vec::new(), Vec::new());
     let mut head = [0; 3];
     while socket.read_exact(&mut head).is_ok() {
@@ -129,7 +90,8 @@ pub fn serve(mut socket: TcpStream, number: u64, controller: &Mutex<Controller>)
         if socket.read_exact(&mut body).is_err() {
             break;
         }
-        let mut controller = controller.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+        let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+        let Served { controller, streams, .. } = &mut *served;
         if controller.faults.is_deaf || controller.faults.is_unplugged {
             continue;
         }
@@ -146,9 +108,9 @@ pub fn serve(mut socket: TcpStream, number: u64, controller: &Mutex<Controller>)
                     .filter(|name| !name.is_empty())
                     .map(str::to_owned)
                     .collect();
-                let states = States::read(&mut controller);
+                let states = States::read(controller);
                 let types: Vec<_> =
-                    names.iter().map(|name| states.value(name).map_or("NOT_FOUND", |(kind, _)| kind)).collect();
+                    names.iter().map(|name| value(&states, name).map_or("NOT_FOUND", |(kind, _)| kind)).collect();
                 [&[1], types.join(",").as_bytes()].concat()
             }
             INPUTS => {
@@ -168,19 +130,19 @@ pub fn serve(mut socket: TcpStream, number: u64, controller: &Mutex<Controller>)
             }
             b'S' | b'P' => vec![1],
             DATA => {
-                write(&mut controller, &recipes, &body);
+                write(controller, &recipes, &body);
                 continue;
             }
             _ => continue,
         };
         socket.write_all(&packet(head[2], &answer))?;
         if head[2] == b'S' {
-            controller.streams.push(Stream { socket: socket.try_clone()?, names: names.clone() });
+            streams.push(Stream { socket: socket.try_clone()?, names: names.clone() });
         }
     }
-    let mut controller = controller.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
-    if controller.owner == Some(number) {
-        controller.owner = None;
+    let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+    if served.controller.owner == Some(number) {
+        served.controller.owner = None;
     }
     Ok(())
 }
@@ -188,6 +150,7 @@ pub fn serve(mut socket: TcpStream, number: u64, controller: &Mutex<Controller>)
 fn write(controller: &mut Controller, recipes: &[Vec<Input>], body: &[u8]) {
     let Some((id, mut rest)) = body.split_first() else { return };
     let Some(recipe) = recipes.get((*id as usize).wrapping_sub(1)) else { return };
+    let mut written = Vec::new();
     for input in recipe {
         let size = match input {
             Input::Int(_) => 4,
@@ -197,10 +160,10 @@ fn write(controller: &mut Controller, recipes: &[Vec<Input>], body: &[u8]) {
         let Some((bytes, after)) = rest.split_at_checked(size) else { return };
         rest = after;
         match (*input, bytes.try_into(), bytes.try_into()) {
-            (Input::Int(0), Ok(bytes), _) => controller.hear(i32::from_be_bytes(bytes)),
-            (Input::Int(at), Ok(bytes), _) => controller.ints_in[at] = i32::from_be_bytes(bytes),
-            (Input::Double(at), _, Ok(bytes)) => controller.doubles_in[at] = f64::from_be_bytes(bytes),
+            (Input::Int(at), Ok(bytes), _) => written.push(Written::Int(at, i32::from_be_bytes(bytes))),
+            (Input::Double(at), _, Ok(bytes)) => written.push(Written::Double(at, f64::from_be_bytes(bytes))),
             _ => {}
         }
     }
+    controller.write(written);
 }

@@ -14,11 +14,15 @@ use super::guard::Halt;
 use super::params::UrParams;
 use super::probe::probe;
 use super::protocol::{Action, UrState, pose_of, vector_of};
-use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety};
+use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety, Slowed};
 use crate::stylus::Wrench;
 
 /// Time between two states, s: an e-Series sends them at 500 Hz.
-const PERIOD: f64 = 2e-3;
+pub(super) const PERIOD: f64 = 2e-3;
+/// States at the start whose rate is looked at.
+const RATED: usize = 5;
+/// The least time between two of them may be longer than it should be by this factor.
+const SAME_PERIOD: f64 = 1.5;
 /// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise. An assumption, not yet
 /// verified on a robot: docs/ur.md has the check.
 const FORCE_SIGN: f64 = 1.0;
@@ -59,7 +63,21 @@ impl UrArm {
             return Err(UrError::Stopped(safety));
         }
         let client = Client::start(params, dashboard)?;
-        let last = client.next_state(params.deadlines.connect).map_err(|error| UrError::Client(error.to_string()))?;
+        let next = || client.next_state(params.deadlines.connect).map_err(|error| UrError::Client(error.to_string()));
+        let mut last = next()?;
+        // one may be left out
+        let mut least_s = f64::INFINITY;
+        for _ in 0..RATED {
+            let state = next()?;
+            least_s = least_s.min(state.stamp_s - last.stamp_s);
+            last = state;
+        }
+        if least_s > PERIOD * SAME_PERIOD {
+            return Err(UrError::Rate { host: params.host.clone(), hz: 1.0 / least_s, needed_hz: 1.0 / PERIOD });
+        }
+        if let Some(slowed) = last.slowed() {
+            tracing::warn!("{slowed}: links, searches and retractions take as much longer, and may end as not arrived");
+        }
         Ok(Self { params: params.clone(), client, last, freshness: Freshness::default() })
     }
 
@@ -69,7 +87,7 @@ impl UrArm {
     /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`], [`ArmError::Refused`] where it cannot be connected.
     pub fn recovered(params: &UrParams) -> Result<Self, ArmError> {
         Self::unlock(params)?;
-        Self::connect(params).map_err(|error| Self::refused("to recover", error.to_string()))
+        Self::connect(params).map_err(|error| refused("to recover", error.to_string()))
     }
 
     /// How the arm was stopped at the last fault of its connection or of its client; `None`: there was none.
@@ -80,66 +98,6 @@ impl UrArm {
     /// Number of the process that speaks to the arm.
     pub fn client_id(&self) -> u32 {
         self.client.id
-    }
-
-    fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
-        ArmError::Refused { what, reason: reason.into() }
-    }
-
-    /// The order that a command is, now.
-    fn order(&self, command: &Command) -> Result<Action, ArmError> {
-        match *command {
-            Command::Line { to, speed, acceleration } => {
-                self.check("a line", speed, acceleration)?;
-                let is_pose = vector_of(&to).iter().all(|part| part.is_finite());
-                if !is_pose {
-                    return Err(Self::refused("a line", "its end is no pose"));
-                }
-                Ok(Action::Move { twist: towards(&pose_of(self.last.pose), &to, speed, acceleration), acceleration })
-            }
-            Command::Velocity { linear, acceleration } => {
-                self.check("a velocity", linear.norm(), acceleration)?;
-                Ok(Action::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
-            }
-            Command::Press { axis, force, feed, speed } => {
-                self.check("a press", feed.norm().max(speed), FEED_ACCELERATION)?;
-                if !(0.0..=self.params.top_force).contains(&force) {
-                    let most = self.params.top_force;
-                    return Err(Self::refused("a press", format!("{force} N is not from 0 to {most} N")));
-                }
-                let Some(frame) = frame_along(&axis) else {
-                    return Err(Self::refused("a press", "its axis is no direction"));
-                };
-                let place = pose_of(self.last.pose).translation.vector;
-                let frame = Isometry3::from_parts(place.into(), frame);
-                let across = feed - axis * feed.dot(&axis);
-                Ok(Action::Press {
-                    frame: vector_of(&frame),
-                    force_n: force,
-                    speed,
-                    feed: across.into(),
-                    acceleration: FEED_ACCELERATION,
-                })
-            }
-            Command::Stop { deceleration } => {
-                self.check("a stop", 0.0, deceleration)?;
-                Ok(Action::Stop { deceleration })
-            }
-        }
-    }
-
-    fn check(&self, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
-        let most = self.params.top_speed;
-        if !(0.0..=most).contains(&speed) {
-            return Err(Self::refused(what, format!("{speed} m/s is not from 0 to {most} m/s")));
-        }
-        if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-            return Err(Self::refused(
-                what,
-                format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
-            ));
-        }
-        Ok(())
     }
 
     /// Clears the stop of the arm, as far as a call can.
@@ -168,19 +126,7 @@ impl UrArm {
 impl Arm for UrArm {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.last = self.client.next_state(self.params.deadlines.connect)?;
-        let state = &self.last;
-        let wrench = |[x, y, z, a, b, c]: [f64; 6]| Wrench {
-            force: Vector3::new(x, y, z) * FORCE_SIGN,
-            torque: Vector3::new(a, b, c) * FORCE_SIGN,
-        };
-        Ok(ArmState {
-            stamp_ns: (state.stamp_s * 1e9).round() as i64,
-            pose_bt: pose_of(state.pose),
-            wrench_b: wrench(state.wrench),
-            raw_wrench_f: wrench(state.raw_wrench),
-            joints: state.joints.into(),
-            safety: state.safety(),
-        })
+        Ok(seen(&self.last))
     }
 
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {
@@ -188,7 +134,7 @@ impl Arm for UrArm {
         if safety != Safety::Normal && !matches!(command, Command::Stop { .. }) {
             return Err(ArmError::Stopped { safety });
         }
-        let order = self.order(command)?;
+        let order = order_of(command, &self.last, &self.params)?;
         let is_stop = matches!(command, Command::Stop { .. });
         // a stop is right whenever it comes
         if is_stop || self.freshness.may_send(self.last.stamp_s, self.client.newest_s())? {
@@ -213,13 +159,92 @@ impl Arm for UrArm {
     fn recover(&mut self) -> Result<(), ArmError> {
         Self::unlock(&self.params)?;
         self.client.close("was ended for a restart, and that failed");
-        *self = Self::connect(&self.params).map_err(|error| Self::refused("to recover", error.to_string()))?;
+        *self = Self::connect(&self.params).map_err(|error| refused("to recover", error.to_string()))?;
         Ok(())
     }
 
     fn period(&self) -> f64 {
         PERIOD
     }
+
+    fn slowed(&self) -> Option<Slowed> {
+        self.last.slowed()
+    }
+}
+
+fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
+    ArmError::Refused { what, reason: reason.into() }
+}
+
+/// What a state says of the arm.
+pub(super) fn seen(state: &UrState) -> ArmState {
+    let wrench = |[x, y, z, a, b, c]: [f64; 6]| Wrench {
+        force: Vector3::new(x, y, z) * FORCE_SIGN,
+        torque: Vector3::new(a, b, c) * FORCE_SIGN,
+    };
+    ArmState {
+        stamp_ns: (state.stamp_s * 1e9).round() as i64,
+        pose_bt: pose_of(state.pose),
+        wrench_b: wrench(state.wrench),
+        raw_wrench_f: wrench(state.raw_wrench),
+        joints: state.joints.into(),
+        safety: state.safety(),
+    }
+}
+
+/// The order that a command is.
+///
+/// - `last`: the state that it follows.
+pub(super) fn order_of(command: &Command, last: &UrState, params: &UrParams) -> Result<Action, ArmError> {
+    match *command {
+        Command::Line { to, speed, acceleration } => {
+            check(params, "a line", speed, acceleration)?;
+            let is_pose = vector_of(&to).iter().all(|part| part.is_finite());
+            if !is_pose {
+                return Err(refused("a line", "its end is no pose"));
+            }
+            Ok(Action::Move { twist: towards(&pose_of(last.pose), &to, speed, acceleration), acceleration })
+        }
+        Command::Velocity { linear, acceleration } => {
+            check(params, "a velocity", linear.norm(), acceleration)?;
+            Ok(Action::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
+        }
+        Command::Press { axis, force, feed, speed } => {
+            check(params, "a press", feed.norm().max(speed), FEED_ACCELERATION)?;
+            if !(0.0..=params.top_force).contains(&force) {
+                let most = params.top_force;
+                return Err(refused("a press", format!("{force} N is not from 0 to {most} N")));
+            }
+            let Some(frame) = frame_along(&axis) else {
+                return Err(refused("a press", "its axis is no direction"));
+            };
+            let place = pose_of(last.pose).translation.vector;
+            let frame = Isometry3::from_parts(place.into(), frame);
+            let across = feed - axis * feed.dot(&axis);
+            Ok(Action::Press {
+                frame: vector_of(&frame),
+                force_n: force,
+                speed,
+                feed: across.into(),
+                acceleration: FEED_ACCELERATION,
+            })
+        }
+        Command::Stop { deceleration } => {
+            check(params, "a stop", 0.0, deceleration)?;
+            Ok(Action::Stop { deceleration })
+        }
+    }
+}
+
+fn check(params: &UrParams, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
+    let most = params.top_speed;
+    if !(0.0..=most).contains(&speed) {
+        return Err(refused(what, format!("{speed} m/s is not from 0 to {most} m/s")));
+    }
+    if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
+        return Err(refused(what, format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²")));
+    }
+    Ok(())
 }
 
 /// Velocity of the tip towards a pose, m/s and rad/s in B; both come to their end together.

@@ -39,6 +39,18 @@ pub enum UrError {
         /// what it runs
         found: String,
     },
+    /// Its states come too seldom.
+    #[error(
+        "the controller at {host} sends {hz:.0} states a second where {needed_hz:.0} are needed: an e-Series at its full rate"
+    )]
+    Rate {
+        /// of the controller
+        host: String,
+        /// found
+        hz: f64,
+        /// needed
+        needed_hz: f64,
+    },
     /// Somebody else has the say.
     #[error("the controller at {host} is in local control: set it to remote control at its panel")]
     Local {

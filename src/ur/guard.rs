@@ -159,7 +159,7 @@ impl GuardState {
     }
 
     /// Notes a state of a client that is ready; whether it is the first in which something else stops a program that is still there.
-    fn is_to_be_ended(&mut self, state: &UrState) -> bool {
+    pub fn is_to_be_ended(&mut self, state: &UrState) -> bool {
         let is_first = self.is_ready && !state.may_move() && !self.has_halted;
         self.has_halted |= is_first;
         self.was_paused |= is_first && state.program == ProgramState::Paused;

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::probing::arm::Safety;
+use crate::probing::arm::{Safety, Slowed};
 
 /// The one version of ur-rtde that this was made and tested with.
 pub const WHEEL: &str = "1.6.5";
@@ -94,6 +94,8 @@ pub struct UrState {
     pub joints: [f64; 6],
     /// as the controller has them
     pub safety_bits: u32,
+    /// of the speed slider, 0 to 1
+    pub speed_fraction: f64,
     /// what of the uploaded program
     pub program: ProgramState,
     /// number of the last order whose calls have returned
@@ -118,7 +120,19 @@ const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
 /// Protective stop, and stopped for any reason of safety.
 const PROTECTIVE_BITS: u32 = 1 << 2 | 1 << 10;
 
+/// Of `safety_status_bits`: reduced mode.
+const REDUCED_BIT: u32 = 1 << 1;
+/// A slider that is all the way up may read a little less.
+const FULL: f64 = 0.999;
+
 impl UrState {
+    /// What makes it slower than it is ordered to be.
+    pub fn slowed(&self) -> Option<Slowed> {
+        let is_reduced = self.safety_bits & REDUCED_BIT != 0;
+        let is_slow = is_reduced || self.speed_fraction < FULL;
+        is_slow.then(|| Slowed { slider_percent: self.speed_fraction * 100.0, is_reduced })
+    }
+
     /// Whether it does what it is ordered to.
     pub fn is_playing(&self) -> bool {
         self.program == ProgramState::Playing
@@ -181,6 +195,7 @@ pub(super) mod tests {
         raw_wrench: [2.0 / 3.0; 6],
         joints: [3.0; 6],
         safety_bits: 1,
+        speed_fraction: 1.0,
         program: ProgramState::Playing,
         served: 7,
     };
@@ -194,6 +209,17 @@ pub(super) mod tests {
         assert_eq!(safety(1 << 2 | 1 << 10), Safety::ProtectiveStop);
         assert_eq!(safety(1 << 7 | 1 << 2), Safety::OperatorStop);
         assert_eq!(safety(1 << 9 | 1 << 7), Safety::Fault);
+    }
+
+    #[test]
+    fn a_slider_below_its_end_and_reduced_mode_are_named() {
+        let words = |speed_fraction, safety_bits| {
+            UrState { speed_fraction, safety_bits, ..STATE }.slowed().map(|by| by.to_string())
+        };
+        assert_eq!(words(1.0, 1), None);
+        assert_eq!(words(0.05, 1).unwrap(), "its speed slider is at 5 %");
+        assert_eq!(words(1.0, 0b10).unwrap(), "its safety is in reduced mode");
+        assert_eq!(words(0.4, 0b10).unwrap(), "its speed slider is at 40 % and its safety in reduced mode");
     }
 
     #[test]

@@ -527,3 +527,19 @@ fn an_operators_stop_is_released_by_the_operator_alone() {
         Ok(())
     });
 }
+
+/// A line of 10 mm at 50 mm/s has 2.9 s, and takes 4 s at 5 %.
+#[test]
+fn a_speed_slider_is_named_where_the_arm_does_not_arrive() {
+    with_library(|packages| {
+        let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
+        let mut arm = stand_in.connect(packages);
+        stand_in.send("slider 5");
+        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
+        let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
+        let up = at([PLACE[0], PLACE[1], 50e-3]);
+        let error = watched.line("going up", &up, SPEED, &TouchParams::default(), limits().force).err().unwrap();
+        assert!(error.to_string().ends_with(": its speed slider is at 5 %"), "{error}");
+        Ok(())
+    });
+}

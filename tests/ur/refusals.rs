@@ -77,6 +77,17 @@ fn a_wrong_controller_or_library_is_refused() {
     });
 }
 
+#[test]
+fn a_controller_whose_states_come_at_125_hz_is_refused() {
+    with_library(|packages| {
+        let mut stand_in = StandIn::start(&[]);
+        stand_in.send("rate 125");
+        let error = UrArm::connect(&stand_in.params(packages)).err().unwrap();
+        assert!(matches!(error, UrError::Rate { hz, .. } if (hz - 125.0).abs() < 1.0), "{error}");
+        Ok(())
+    });
+}
+
 /// In local control, without power, silent, gone. The library would wait for a silent one without end.
 #[test]
 fn a_controller_that_is_not_at_hand_is_reported_at_once() {

@@ -157,7 +157,7 @@ impl<'a, C: Control> Driver<'a, C> {
                     self.force_mode = force_mode;
                     self.control.press(frame, force_n, FIXED_FRAME, [far, far, speed, turned, turned, turned])?;
                     self.pressed = self.clock.now();
-                    self.clock.sleep(CYCLES);
+                    self.control.wait(&self.clock, CYCLES);
                 }
                 self.control.speed([x, y, z, 0.0, 0.0, 0.0], acceleration)
             }
@@ -173,7 +173,7 @@ impl<'a, C: Control> Driver<'a, C> {
     fn prepare(&mut self) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
         while !self.control.is_running() && self.clock.since(begun) < UPLOAD {
-            self.clock.sleep(TURN);
+            self.control.wait(&self.clock, TURN);
         }
         self.doing = Doing::Resting;
         let found = self.set_up().map_err(DriverEnd::NotReady)?;
@@ -263,7 +263,7 @@ impl<'a, C: Control> Driver<'a, C> {
         let begun = self.clock.now();
         while self.doing != Doing::Resting && self.clock.since(begun) < UPLOAD {
             self.brake(BRAKE)?;
-            self.clock.sleep(TURN);
+            self.control.wait(&self.clock, TURN);
         }
         if self.doing == Doing::Resting { Ok(()) } else { Err(ChildError::Moves { after: UPLOAD }) }
     }
@@ -280,7 +280,7 @@ impl<'a, C: Control> Driver<'a, C> {
             if self.shared.latest().is_some_and(|latest| !latest.state.may_move()) {
                 return Ok(());
             }
-            self.clock.sleep(TURN);
+            self.control.wait(&self.clock, TURN);
         }
         self.shared.report(&failure(error));
         Ok(())
@@ -305,5 +305,7 @@ fn newest(mut order: Order, orders: &Receiver<Order>) -> Order {
     order
 }
 
+#[cfg(test)]
+mod scripted;
 #[cfg(test)]
 mod tests;

@@ -4,11 +4,13 @@
 //! library does not look at them.
 
 use std::path::Path;
+use std::time::Duration;
 
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
 use super::error::ChildError;
+use crate::clock::Clock;
 use crate::ur::protocol::{ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
@@ -17,7 +19,7 @@ const RATE_HZ: f64 = 500.0;
 const FLAGS: u32 = 0x01 | 0x40;
 const CAP_PORT: u16 = 50002;
 /// The requested states: the default are 58 of 1180 bytes.
-const VARIABLES: [&str; 9] = [
+const VARIABLES: [&str; 10] = [
     "timestamp",
     "actual_q",
     "actual_TCP_pose",
@@ -25,6 +27,7 @@ const VARIABLES: [&str; 9] = [
     "actual_TCP_force",
     "ft_raw_wrench",
     "safety_status_bits",
+    "target_speed_fraction",
     "runtime_state",
     "robot_status_bits",
 ];
@@ -105,6 +108,7 @@ impl Receive {
                     raw_wrench: read("getFtRawWrench")?.extract(py)?,
                     joints: read("getActualQ")?.extract(py)?,
                     safety_bits: read("getSafetyStatusBits")?.extract(py)?,
+                    speed_fraction: read("getTargetSpeedFraction")?.extract(py)?,
                     program: match read("getRuntimeState")?.extract::<u32>(py)? {
                         PLAYING => ProgramState::Playing,
                         state if PAUSED.contains(&state) => ProgramState::Paused,
@@ -154,6 +158,10 @@ pub trait Control {
     fn feed(&self) -> Result<(), ChildError>;
     /// Ends the program of the controller.
     fn end_program(&self) -> Result<(), ChildError>;
+    /// Lets time pass; what a library does meanwhile goes on.
+    fn wait(&self, clock: &Clock, time: Duration) {
+        clock.sleep(time);
+    }
 }
 
 /// `rtde_control`.

@@ -21,7 +21,7 @@ use self::control::{Driver, DriverEnd};
 pub use self::error::ChildError;
 use self::error::failure;
 use self::library::{Receive, RtdeControl, leave};
-use self::shared::ChildShared;
+use self::shared::{ChildShared, lines_to};
 use super::protocol::{Begin, ClientReport, Order};
 use crate::clock::Clock;
 
@@ -34,7 +34,7 @@ pub fn run() -> Result<(), ChildError> {
     let first = lines.next().unwrap_or_default();
     let begin: Begin = serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
     let reports = stdout().as_fd().try_clone_to_owned().map_err(|error| ChildError::NoOrders(error.to_string()))?;
-    let shared = ChildShared::new(reports.into());
+    let shared = ChildShared::new(lines_to(reports.into()));
     if let Err(error) = library::load(&begin.site_packages) {
         shared.report(&ClientReport::BadWheel { reason: error.to_string() });
         return Err(error);

@@ -17,7 +17,7 @@ pub struct Latest {
 
 /// Shared by the threads.
 pub struct ChildShared {
-    pub reports: Mutex<PipeWriter>,
+    reports: Box<dyn Fn(&ClientReport) + Send + Sync>,
     /// number of the last order whose calls have returned
     pub served: AtomicU64,
     pub latest: Mutex<Option<Latest>>,
@@ -27,17 +27,26 @@ pub struct ChildShared {
     pub has_halted: AtomicBool,
 }
 
-impl ChildShared {
-    pub fn report(&self, report: &ClientReport) {
+/// Writes a line for each report.
+pub fn lines_to(pipe: PipeWriter) -> impl Fn(&ClientReport) + Send + Sync + 'static {
+    let pipe = Mutex::new(pipe);
+    move |report| {
         let Ok(mut line) = serde_json::to_vec(report) else { return };
         line.push(b'\n');
         // when the reader is gone, stdin ends too
-        let _ = self.reports.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
+        let _ = pipe.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
+    }
+}
+
+impl ChildShared {
+    pub fn report(&self, report: &ClientReport) {
+        (self.reports)(report);
     }
 
-    pub fn new(reports: PipeWriter) -> Self {
+    /// - `reports`: takes each.
+    pub fn new(reports: impl Fn(&ClientReport) + Send + Sync + 'static) -> Self {
         Self {
-            reports: Mutex::new(reports),
+            reports: Box::new(reports),
             served: AtomicU64::new(0),
             latest: Mutex::new(None),
             is_ready: AtomicBool::new(false),

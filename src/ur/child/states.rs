@@ -39,9 +39,9 @@ pub fn hand_on(receive: &Receive, shared: &ChildShared, clock: &Clock, hand: Opt
 }
 
 /// The last report, and its time.
-struct LastReport {
-    stamp_s: f64,
-    at: Instant,
+pub struct LastReport {
+    pub stamp_s: f64,
+    pub at: Instant,
 }
 
 impl LastReport {
@@ -50,7 +50,7 @@ impl LastReport {
     }
 
     /// The report due now.
-    fn next(&mut self, state: Option<UrState>, served: u64, now: Instant) -> Option<ClientReport> {
+    pub fn next(&mut self, state: Option<UrState>, served: u64, now: Instant) -> Option<ClientReport> {
         let report = match state {
             Some(state) => {
                 self.stamp_s = state.stamp_s;

@@ -9,6 +9,7 @@ use std::thread;
 use self::LibraryCall::{EndPress, EndProgram, Feed, HardStop, Press, Set, Speed, Zero};
 use super::*;
 use crate::clock::ManualClock;
+use crate::ur::child::shared::lines_to;
 use crate::ur::protocol::ProgramState::{self, Ended, Paused, Playing};
 use crate::ur::protocol::tests::STATE;
 
@@ -148,7 +149,7 @@ impl ControlBench {
             tool: Cell::new(tool),
         };
         let (reports, writer) = pipe().unwrap();
-        let shared = ChildShared::new(writer);
+        let shared = ChildShared::new(lines_to(writer));
         shared.see(STATE, fake.begun);
         let begin = Begin {
             host: String::new(),

@@ -91,6 +91,26 @@ pub enum Command {
     },
 }
 
+/// What makes an arm slower than it is ordered to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slowed {
+    /// of the speed slider, %
+    pub slider_percent: f64,
+    /// whether its safety system is in reduced mode
+    pub is_reduced: bool,
+}
+
+impl std::fmt::Display for Slowed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { slider_percent, is_reduced } = *self;
+        match (slider_percent < 100.0, is_reduced) {
+            (true, false) => write!(f, "its speed slider is at {slider_percent:.0} %"),
+            (true, true) => write!(f, "its speed slider is at {slider_percent:.0} % and its safety in reduced mode"),
+            (false, _) => write!(f, "its safety is in reduced mode"),
+        }
+    }
+}
+
 /// Why an arm does not execute a command.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
@@ -197,6 +217,11 @@ pub trait Arm {
 
     /// Time between two states, s.
     fn period(&self) -> f64;
+
+    /// What makes it slower than it is ordered to be, as far as it says so.
+    fn slowed(&self) -> Option<Slowed> {
+        None
+    }
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ mod watched;
 pub use bodies::{ArmBodies, Link};
 pub use capsule::Capsule;
 pub use geometry::ArmGeometry;
-pub use interface::{Arm, ArmError, ArmState, Command, Safety};
+pub use interface::{Arm, ArmError, ArmState, Command, Safety, Slowed};
 pub(crate) use joints::largest_turn;
 pub use joints::{Joints, MOST_JOINTS};
 pub use kinematics::UrGeometry;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::interface::{Arm, ArmError, ArmState, Command, Safety};
+use super::interface::{Arm, ArmError, ArmState, Command, Safety, Slowed};
 use super::limits::{LimitError, Limits};
 use super::measured_motion::MeasuredMotion;
 use super::touch_params::{TouchParams, UNEXPECTED};
@@ -86,12 +86,14 @@ pub enum ProbeError {
         period_ms: f64,
     },
     /// A motion does not end.
-    #[error("while {doing}: the arm did not arrive within {limit_s:.1} s")]
+    #[error("while {doing}: the arm did not arrive within {limit_s:.1} s{}", slowed.map(|by| format!(": {by}")).unwrap_or_default())]
     TooLong {
         /// what was being done
         doing: &'static str,
         /// s
         limit_s: f64,
+        /// by what, where it says so
+        slowed: Option<Slowed>,
     },
     /// A request stopped it.
     #[error("cancelled while {doing}")]
@@ -482,7 +484,7 @@ impl<'a> Watched<'a> {
 
     pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
         self.send(doing, &self.hard_stop())?;
-        Err(ProbeError::TooLong { doing, limit_s })
+        Err(ProbeError::TooLong { doing, limit_s, slowed: self.arm.slowed() })
     }
 }
 

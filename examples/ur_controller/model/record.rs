@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
-use crate::body::Body;
+use super::body::Body;
 
 /// Each line is there to be read when its period has passed.
 pub struct Record {

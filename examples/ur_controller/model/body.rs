@@ -71,6 +71,15 @@ pub struct Body<'a> {
     waiting: VecDeque<(f64, Motion, Option<Force>)>,
     motion: Motion,
     force: Option<Force>,
+    /// of the part, upwards in O, m
+    raised: f64,
+    /// of the panel: each velocity of a program is scaled by it, 0 to 1
+    pub slider: f64,
+    /// of the sensor along z of the flange, N/s
+    pub drift: f64,
+    drifted: f64,
+    /// of the force per axis beside that of the parameters, root mean square, N
+    pub more_noise: f64,
     spike: u32,
     spike_force: f64,
     /// TCP set by the client, in the flange
@@ -99,6 +108,11 @@ impl<'a> Body<'a> {
             waiting: VecDeque::new(),
             motion: Motion::rest(HARD_STOP),
             force: None,
+            raised: 0.0,
+            slider: 1.0,
+            drift: 0.0,
+            drifted: 0.0,
+            more_noise: 0.0,
             spike: 0,
             spike_force: 0.0,
             tcp: Isometry3::identity(),
@@ -122,6 +136,11 @@ impl<'a> Body<'a> {
         (self.spike, self.spike_force) = (SPIKE, force);
     }
 
+    /// The part is higher by this from now on, m.
+    pub fn raise(&mut self, by: f64) {
+        self.raised += by;
+    }
+
     pub fn zero_sensor(&mut self) {
         // a mean of many readings: the noise of one does not stay
         self.tare = self.unweighed();
@@ -133,7 +152,7 @@ impl<'a> Body<'a> {
         let r_bf = self.flange().rotation;
         let weight = |payload: &Payload| payload.weight_o(&r_bf).force;
         let load = weight(&self.params.payload) - weight(&self.configured_payload);
-        r_bf.inverse() * (self.contact_force() + load) + self.params.force_bias
+        r_bf.inverse() * (self.contact_force() + load) + self.params.force_bias + Vector3::z() * self.drifted
     }
 
     /// What is taken for the part's, N in B.
@@ -153,13 +172,14 @@ impl<'a> Body<'a> {
 
     fn step(&mut self) {
         self.time += STEP;
+        self.drifted += self.drift * STEP;
         while let Some(&(at, motion, force)) = self.waiting.front()
             && at <= self.time
         {
             self.waiting.pop_front();
             (self.motion, self.force) = (motion, force);
         }
-        let (mut wanted, mut acceleration) = (self.motion.linear, self.motion.acceleration);
+        let (mut wanted, mut acceleration) = (self.motion.linear * self.slider, self.motion.acceleration);
         if let Some(Force { axis, force, speed }) = self.force {
             let late = self.params.command_latency + self.params.force_latency + PERIOD;
             let gain = 1.0 / (4.0 * self.params.stiffness * late);
@@ -168,7 +188,7 @@ impl<'a> Body<'a> {
             acceleration = self.params.top_acceleration;
         }
         self.linear += (wanted.cap_magnitude(self.params.top_speed) - self.linear).cap_magnitude(acceleration * STEP);
-        self.angular += (self.motion.angular - self.angular).cap_magnitude(TURN_ACCELERATION * STEP);
+        self.angular += (self.motion.angular * self.slider - self.angular).cap_magnitude(TURN_ACCELERATION * STEP);
         // the velocity is that of the configured TCP
         let mut tool = self.flange() * self.tcp;
         let turn = UnitQuaternion::from_scaled_axis(self.angular * STEP);
@@ -182,7 +202,10 @@ impl<'a> Body<'a> {
 
     fn bend(&mut self) {
         let params = &self.params;
-        let nominal = params.pose_bo.inverse_transform_point(&Point3::from(self.nominal.translation.vector));
+        // in the part's own axes, which rise with it
+        let up = Vector3::z() * self.raised;
+        let nominal = params.pose_bo.inverse_transform_point(&Point3::from(self.nominal.translation.vector)) - up;
+        self.ball -= up;
         let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, params.radius);
         let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
         let mut next = rest;
@@ -191,7 +214,7 @@ impl<'a> Body<'a> {
             let kept = (behind - out * behind.dot(&out)).cap_magnitude(params.friction * normal.norm());
             next = push_ball(self.surface, &rest, &(rest + kept), params.radius).0;
         }
-        self.ball = next;
+        self.ball = next + up;
         let force = if contacts.is_empty() { Vector3::zeros() } else { (next - nominal) * params.stiffness };
         self.forces.push_back(params.pose_bo.rotation * force);
         self.forces.pop_front();
@@ -235,7 +258,8 @@ impl<'a> Body<'a> {
     pub fn read_wrenches(&mut self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let shaft = self.nominal.rotation * Vector3::z();
         let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
-        let (noise, torque_noise) = (self.noise(self.params.force_noise), self.noise(self.params.torque_noise));
+        let (noise, torque_noise) =
+            (self.noise(self.params.force_noise + self.more_noise), self.noise(self.params.torque_noise));
         let ArmParams { payload, pose_ft, force_bias, torque_bias, .. } = &self.params;
         let r_bf = self.flange().rotation;
         let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));

@@ -1,14 +1,14 @@
 //! What of a UR's controller the client sees: registers, the program that it uploads, the safety system, and what goes wrong.
 
-use std::net::{Shutdown, TcpStream};
+use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use touchup::stylus::Payload;
 
-use crate::body::{Body, Force, HARD_STOP, Motion};
-use crate::record::Record;
-use crate::rtde::Stream;
+use super::body::{Body, Force, HARD_STOP, Motion, PERIOD};
+use super::record::Record;
+use super::states::States;
 
 /// From the end of an upload to the first cycle of the program, s.
 const START: f64 = 20e-3;
@@ -43,8 +43,14 @@ pub struct Faults {
     pub is_stuck: bool,
     /// its main loop hangs as soon as it is ready for the next command: each is taken and none is read, and its threads live
     pub is_hung: bool,
+    /// the thread of its motion has ended, and its main loop lives: commands are read, and none is followed
+    pub is_tired: bool,
     /// the dashboard does not answer
     pub is_mute: bool,
+    /// states come so much later, s
+    pub states_late: f64,
+    /// so do orders, s
+    pub orders_late: f64,
     /// the controller has lost its power
     pub is_dead: bool,
 }
@@ -72,6 +78,13 @@ struct Program {
     speed_time: f64,
 }
 
+/// A register that a client writes.
+#[derive(Clone, Copy)]
+pub enum Written {
+    Int(usize, i32),
+    Double(usize, f64),
+}
+
 pub struct Controller<'a> {
     pub body: Body<'a>,
     pub version: [u32; 3],
@@ -96,9 +109,16 @@ pub struct Controller<'a> {
     granted_until: f64,
     /// the connection whose inputs count
     pub owner: Option<u64>,
-    pub streams: Vec<Stream>,
-    /// all connections, of all ports
-    pub sockets: Vec<TcpStream>,
+    /// the safety system keeps the arm slow
+    pub is_reduced: bool,
+    /// whether its watchdog counts while the program is paused; unknown of a real one
+    pub watchdog_counts_paused: bool,
+    /// periods between two states
+    every: u64,
+    periods: u64,
+    /// not there yet: when they are, s
+    coming_states: VecDeque<(f64, States)>,
+    coming_orders: VecDeque<(f64, Vec<Written>)>,
     program: Program,
 }
 
@@ -121,8 +141,12 @@ impl<'a> Controller<'a> {
             quiet_looks: 0,
             granted_until: 0.0,
             owner: None,
-            streams: Vec::new(),
-            sockets: Vec::new(),
+            is_reduced: false,
+            watchdog_counts_paused: false,
+            every: 1,
+            periods: 0,
+            coming_states: VecDeque::new(),
+            coming_orders: VecDeque::new(),
             program: Program::default(),
         }
     }
@@ -135,8 +159,39 @@ impl<'a> Controller<'a> {
         self.program.is_paused
     }
 
+    /// States come with this rate from now on, Hz.
+    pub fn set_rate(&mut self, hz: f64) {
+        self.every = (1.0 / (hz * PERIOD)).round().max(1.0) as u64;
+    }
+
+    /// The client has written some registers, the command last.
+    pub fn write(&mut self, written: Vec<Written>) {
+        if self.faults.is_deaf || self.faults.is_unplugged {
+            return;
+        }
+        self.coming_orders.push_back((self.body.time + self.faults.orders_late, written));
+        self.take_orders();
+    }
+
+    fn take_orders(&mut self) {
+        while let Some((_, written)) = self.coming_orders.pop_front_if(|(at, _)| *at <= self.body.time) {
+            for register in written {
+                match register {
+                    Written::Int(0, id) => self.hear(id),
+                    Written::Int(at, value) => self.ints_in[at] = value,
+                    Written::Double(at, value) => self.doubles_in[at] = value,
+                }
+            }
+        }
+    }
+
+    /// The next states that have come to the client.
+    pub fn sent(&mut self) -> Option<States> {
+        self.coming_states.pop_front_if(|(at, _)| *at <= self.body.time).map(|(_, states)| states)
+    }
+
     /// The client has written the register of commands.
-    pub fn hear(&mut self, id: i32) {
+    fn hear(&mut self, id: i32) {
         // an earlier command that it has not read yet is dropped
         if self.is_heard && matches!(self.ints_in[0], 6 | 10) && self.ints_in[0] != id {
             self.record.event(&format!("command {} is never read", self.ints_in[0]));
@@ -173,6 +228,7 @@ impl<'a> Controller<'a> {
         if self.safety == Safety::Normal && self.body.is_over_its_force() {
             self.stop_for(Safety::Protective, "force over the limit of the safety system");
         }
+        self.take_orders();
         self.start_program();
         if self.is_playing() {
             self.cycle();
@@ -223,8 +279,9 @@ impl<'a> Controller<'a> {
         if self.program.is_paused && self.safety == Safety::Normal {
             self.record.event("program resumes");
             self.program.is_paused = false;
-            // a watchdog that does not count while paused
-            self.heard_at = self.body.time;
+            if !self.watchdog_counts_paused {
+                self.heard_at = self.body.time;
+            }
         }
     }
 
@@ -281,6 +338,9 @@ impl<'a> Controller<'a> {
 
     /// The thread that `speedL` starts: it takes a new velocity only when it is done with the one before.
     fn speed(&mut self) {
+        if self.faults.is_tired {
+            return self.body.follow(Motion::rest(HARD_STOP), None);
+        }
         let (now, body) = (self.body.time, &mut self.body);
         let Some(wanted) = self.program.velocity else {
             if self.program.force.is_some() {
@@ -367,22 +427,13 @@ impl<'a> Controller<'a> {
     }
 
     fn send_states(&mut self) {
-        let Faults { is_silent, is_unplugged, is_dead, .. } = self.faults;
+        self.periods += 1;
+        let Faults { is_silent, is_unplugged, is_dead, states_late, .. } = self.faults;
         if is_silent || is_unplugged || is_dead {
-            return;
-        }
-        let mut streams = std::mem::take(&mut self.streams);
-        let states = crate::rtde::States::read(self);
-        streams.retain_mut(|stream| stream.send(&states));
-        self.streams = streams;
-    }
-
-    /// Ends all connections that are there now.
-    pub fn cut(&mut self, ports: &[u16]) {
-        let is_cut = |socket: &TcpStream| socket.local_addr().is_ok_and(|own| ports.contains(&own.port()));
-        for socket in self.sockets.extract_if(.., |socket| is_cut(socket)) {
-            // one that has ended already is as good
-            let _ = socket.shutdown(Shutdown::Both);
+            self.coming_states.clear();
+        } else if self.periods.is_multiple_of(self.every) {
+            let states = States::read(self);
+            self.coming_states.push_back((self.body.time + states_late, states));
         }
     }
 }
