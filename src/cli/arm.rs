@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::CliError;
-use super::probing::{Ready, SpotWorld, millimetres};
+use super::probing::{KeptMeasurements, Ready, SpotWorld, millimetres};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use crate::io::mesh_file::{MeshUnit, read_mesh};
@@ -59,6 +59,9 @@ fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
     let named = |robot: &&RobotSection| !robot.host.is_empty() && !robot.site_packages.is_empty();
     let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
     let (robot, (cell, _)) = robot.ok_or_else(|| CliError::usage(NO_HOST))?;
+    if robot.chain.is_some() {
+        return Err(CliError::usage("a UR is planned with as a UR: name it in robot.model of the scene, not a URDF"));
+    }
     Ok(UrParams {
         pose_ft: cell.pose_ft,
         mass: robot.payload_mass,
@@ -115,15 +118,6 @@ pub(super) struct TouchesOutput {
     /// Output: each touch as it is made, a line of JSON each, so that none is lost whatever ends the measurement
     #[arg(long, value_name = "JSONL", requires = "robot")]
     pub touches_out: Option<PathBuf>,
-}
-
-/// The file in which what an arm measures is kept as it is measured, if any.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum KeptMeasurements<'a> {
-    /// a line of JSON for each touch
-    Touches(Option<&'a Path>),
-    /// a line of CSV for each static segment
-    Segments(Option<&'a Path>),
 }
 
 /// True payload of a simulated arm, where it differs from the scene.

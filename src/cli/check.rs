@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arm::{ArmArguments, KeptMeasurements, TouchesOutput};
-use super::probing::millimetres;
+use super::arm::{ArmArguments, TouchesOutput};
+use super::probing::{KeptMeasurements, millimetres};
 use super::{CliError, Losses, print_report, reported, require, require_positive};
 use crate::probing::execute::{Repeatability, SpotTouch};
 

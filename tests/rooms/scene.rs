@@ -522,3 +522,37 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     assert!(paper.starts_with("built: tip, guard, refine; left out: sync"), "{paper}");
     assert!(paper.ends_with("sliding, carve, patch, uncertainty, robot"), "{paper}");
 }
+
+/// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the next.
+fn urdf_of_seven_joints() -> String {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let joint = |number: usize| {
+        format!(
+            r#"<link name="link{number}"/><joint name="j{number}" type="revolute"><parent link="{}"/><child link="link{number}"/>
+            <origin xyz="0 0 0.1" rpy="{} 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>"#,
+            if number == 1 { "base_link".to_owned() } else { format!("link{}", number - 1) },
+            if number % 2 == 0 { quarter } else { -quarter },
+        )
+    };
+    format!(r#"<robot name="seven"><link name="base_link"/>{}</robot>"#, (1..=7).map(joint).collect::<String>())
+}
+
+#[test]
+fn an_arm_that_is_no_ur_is_read_from_the_urdf_beside_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.yaml");
+    let read = |robot: &str| {
+        std::fs::write(&scene, format!("tip: {{ radius_mm: 1.5 }}\nrobot: {{ model: urdf, {robot} }}")).unwrap();
+        Scene::read(&scene).map(|scene| scene.probing().unwrap().0.geometry)
+    };
+    std::fs::write(folder.path().join("arm.urdf"), urdf_of_seven_joints()).unwrap();
+    let geometry = read("urdf: arm.urdf, flange_link: link7, link_radius_mm: 30").unwrap();
+    assert_eq!(geometry.joint_count(), 7);
+    // at zero the frames turn to and fro: of the last, four steps are up and three aside
+    let flange = geometry.flange(&[0.0; 7].into());
+    assert!((flange.translation.vector - vector![0.0, 0.3, 0.4]).norm() < 1e-14, "{flange}");
+    let error = |robot: &str| read(robot).unwrap_err().to_string();
+    assert!(error("urdf: arm.urdf").contains("there is no link `tool0`; there are base_link, link1"));
+    assert!(error("urdf: other.urdf").contains("cannot read the URDF"));
+    assert!(error("flange_link: link7").ends_with("robot.model: urdf needs robot.urdf: name both or neither"));
+}

@@ -53,3 +53,4 @@ pub mod session_folder;
 pub mod static_poses;
 pub mod table;
 pub mod touches_file;
+pub mod urdf;

@@ -11,7 +11,8 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use tracing::warn;
 
-use super::super::arm::{CellArguments, KeptMeasurements, RobotName, TruePayload};
+use super::super::arm::{CellArguments, RobotName, TruePayload};
+use super::super::probing::KeptMeasurements;
 use super::super::{CliError, Losses, reported, require};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, DraftScene, Vector, rounded};
 use crate::calibrate::{

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::{Point3, Vector3};
 
-use super::super::arm::{CellArguments, KeptMeasurements, RobotName, TouchesOutput};
-use super::super::probing::millimetres;
+use super::super::arm::{CellArguments, RobotName, TouchesOutput};
+use super::super::probing::{KeptMeasurements, millimetres};
 use super::super::{CliError, Losses, reported};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
 use crate::calibrate::{PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip, fit_tip_by_plane};

@@ -29,7 +29,7 @@ pub(super) use ready::Ready;
 use report::ProbedRecord;
 pub(super) use report::ProbingSummary;
 use world::LiveWorld;
-pub(super) use world::SpotWorld;
+pub(super) use world::{KeptMeasurements, SpotWorld};
 
 /// The features to probe, the cell, and the output files.
 pub(super) struct Probing<'a> {

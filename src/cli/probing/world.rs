@@ -9,7 +9,6 @@ use super::files::ProbeFiles;
 use super::follower::{Follower, QUEUE, TakeStates};
 use super::ready::Ready;
 use crate::calibrate::StaticPose;
-use crate::cli::arm::KeptMeasurements;
 use crate::cli::progress::WorkProgress as Bar;
 use crate::cli::signals::StopSignals;
 use crate::cli::{CliError, not_written, print_result};
@@ -173,6 +172,15 @@ pub(in crate::cli) struct SpotWorld<'a> {
     /// m
     ball_radius: f64,
     failed: Option<CliError>,
+}
+
+/// The file in which what an arm measures is kept as it is measured, if any.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::cli) enum KeptMeasurements<'a> {
+    /// a line of JSON for each touch
+    Touches(Option<&'a Path>),
+    /// a line of CSV for each static segment
+    Segments(Option<&'a Path>),
 }
 
 /// What is measured, and the file in which it is kept, if any.

@@ -74,6 +74,7 @@ robot.trigger_n N 1 0.05 80
 robot.largest_force_n N 15 0.1 100
 robot.force_noise_n N 0.15 0.0001 10
 robot.link_mm_per_s mm/s 50 0.1 250
+robot.link_radius_mm mm 60 1 1000
 robot.search_mm_per_s mm/s 10 0.1 250
 robot.measure_mm_per_s mm/s 2 0.05 250
 robot.slide_mm_per_s mm/s 10 0.1 250
@@ -115,7 +116,10 @@ compensation.payload.gravity_axes object object,space
 tip.shape ball ball,flat,cone
 scan.file - -
 scan.unit mm m,mm,inch
-robot.model ur5e ur3e,ur5e,ur10e,ur16e
+robot.model ur5e ur3e,ur5e,ur10e,ur16e,urdf
+robot.urdf - -
+robot.base_link 'base_link' -
+robot.flange_link 'tool0' -
 robot.allow_motion false -
 robot.host '' -
 robot.site_packages '' -

@@ -26,6 +26,9 @@ pub enum SceneError {
     /// A value outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// The description of the arm.
+    #[error(transparent)]
+    Urdf(#[from] touchup_io::urdf::UrdfError),
     /// No face of the scan is near the region that is touched.
     #[error("no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?")]
     EmptyRegion,

@@ -104,7 +104,11 @@ impl Scene {
         let yaml =
             std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
         let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
-        Ok((Self::from_yaml(&yaml).map_err(in_file)?, yaml))
+        let mut scene = Self::from_yaml(&yaml).map_err(in_file)?;
+        if let Some(robot) = &mut scene.robot {
+            robot.read_urdf(path.parent().unwrap_or(Path::new("")))?;
+        }
+        Ok((scene, yaml))
     }
 
     /// The scan that the scene names, and the unit of its coordinates.
@@ -163,6 +167,11 @@ impl Scene {
             ),
             (self.patch.is_some() && radius <= 0.0 && shape != Some(ShapeName::Cone), "patch", "tip.radius_mm above 0"),
             (self.patch.is_some() && self.contact.is_none(), "patch", "contact"),
+            (
+                self.robot.as_ref().is_some_and(|robot| robot.model == ArmModel::Urdf && robot.urdf.is_none()),
+                "robot.model: urdf",
+                "robot.urdf",
+            ),
         ] {
             if is_missing {
                 return Err(SceneError::Incomplete { key, needs });

@@ -8,7 +8,7 @@ use super::{
     Scene, TipSection,
 };
 use touchup_core::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
-use touchup_core::probing::arm::{TouchParams, UrGeometry};
+use touchup_core::probing::arm::{ArmGeometry, TouchParams, UrGeometry};
 use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
 use touchup_core::probing::plan::{PatternParams, sigma_of};
 use touchup_core::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
@@ -36,7 +36,10 @@ impl Scene {
         let (robot, TipParams { radius: ball_radius, stiffness }) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
         let RobotSection { limits, touch, pattern, tool, .. } = robot;
         let cell = Cell {
-            geometry: UrGeometry::of(robot.model.name())?.into(),
+            geometry: match &robot.chain {
+                Some(chain) => ArmGeometry::Chain(chain.clone()),
+                None => UrGeometry::of(robot.model.name())?.into(),
+            },
             pose_bo: self.scan_to_space.as_ref().map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
             pose_ft: robot.pose_ft(),
             tool: Tool { ball_radius, ..*tool },

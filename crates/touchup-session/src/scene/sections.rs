@@ -1,11 +1,12 @@
 //! The sections of the YAML that are no struct of one module of the method: each is what a scene says of one thing.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use touchup_core::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
-use touchup_core::probing::arm::{Limits, TouchParams};
+use touchup_core::probing::arm::{Limits, SerialChain, TouchParams};
 use touchup_core::probing::execute::Tool;
 use touchup_core::probing::plan::PatternParams;
 use touchup_core::stylus::{
@@ -13,6 +14,7 @@ use touchup_core::stylus::{
 };
 use touchup_core::{parameters, words};
 use touchup_io::mesh_file::MeshUnit;
+use touchup_io::urdf::{ArmLinks, UrdfError, read_urdf};
 
 parameters! {
     /// `clock`; it has no keys.
@@ -265,6 +267,8 @@ words! {
         Ur10e = "ur10e",
         /// UR16e
         Ur16e = "ur16e",
+        /// The arm of `robot.urdf`.
+        Urdf = "urdf",
     }
 }
 
@@ -274,6 +278,18 @@ parameters! {
     pub struct RobotSection in "robot" {
         /// Model of the arm.
         model: ArmModel = ArmModel::Ur5e, "model";
+        /// With model: urdf, the description of the arm, its macros expanded, relative to the folder of this scene.
+        urdf: Option<PathBuf> = None, "urdf" like "arm.urdf";
+        /// The link of the URDF whose frame is the base of the arm.
+        base_link: String = "base_link".to_owned(), "base_link";
+        /// The link of the URDF whose frame is the flange.
+        flange_link: String = "tool0".to_owned(), "flange_link";
+        /// How thick links are that the URDF gives no simple shape: the radius of a capsule from joint to joint.
+        ///
+        /// m.
+        link_radius: f64 = 60.0, "link_radius_mm" [MM, 1, 1000];
+        /// Not in the scene: what the URDF describes.
+        chain: Option<Arc<SerialChain>> = None;
         /// Whether it may move at all; without it plans can be made and drawn.
         allow_motion: bool = false, "allow_motion";
         /// Name or address of its controller; a simulated arm has none.
@@ -315,6 +331,16 @@ parameters! {
 impl RobotSection {
     fn is_limited(&self) -> Result<(), SettingError> {
         self.touch.check_within(&self.limits)
+    }
+
+    /// Reads the description of an arm that is no UR.
+    ///
+    /// - `folder`: of the scene.
+    pub(super) fn read_urdf(&mut self, folder: &Path) -> Result<(), UrdfError> {
+        let Some(file) = self.urdf.as_ref().filter(|_| self.model == ArmModel::Urdf) else { return Ok(()) };
+        let links = ArmLinks { base: &self.base_link, flange: &self.flange_link, radius: self.link_radius };
+        self.chain = Some(Arc::new(read_urdf(&folder.join(file), &links)?));
+        Ok(())
     }
 
     /// The tip in the flange.

@@ -9,7 +9,9 @@ use rand_pcg::Pcg64;
 use touchup::features::Kind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};
-use touchup::probing::arm::{Arm, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry};
+use touchup::probing::arm::{
+    Arm, ArmGeometry, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry,
+};
 use touchup::probing::execute::{
     Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, ProbedTouch, Prober, Progress, Tool, World, plan,
 };
@@ -17,6 +19,7 @@ use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
 
 use super::{cell, params};
+use crate::chains::seven_joints;
 use crate::plate_stream::plate_scan;
 
 /// A mesh that stays unchanged.
@@ -127,6 +130,34 @@ fn a_flag_becomes_a_feature() {
     let records = probed.touches.iter().filter_map(|touch| touch.record.as_ref());
     assert!(records.clone().all(|record| record.stamps_ns[1] > record.stamps_ns[0]));
     assert!(probed.touches.iter().any(|touch| touch.deviation.is_some_and(|deviation| deviation < -0.1e-3)));
+}
+
+/// The same with an arm that is no UR: the planner's ways, the joints of the states and the checks are those of seven joints.
+#[test]
+fn a_flag_becomes_a_feature_with_seven_joints_as_with_a_ur() {
+    let chain = seven_joints();
+    let geometry = ArmGeometry::from(chain.clone());
+    let cell = Cell { geometry: geometry.clone(), pose_bo: Isometry3::translation(0.45, -0.03, 0.15), ..cell() };
+    let (lowest, highest) = (Point3::new(0.35, -0.2, 0.1), Point3::new(0.65, 0.2, 0.5));
+    let params = ProbeParams { limits: Limits { lowest, highest, ..params().limits }, ..params() };
+    let simulated = ArmParams { geometry, pose_bo: cell.pose_bo, ..ArmParams::default() };
+    let plate = Plate::default();
+    let mut arm = SimArm::new(&plate, simulated, &above(&cell, [40e-3, 25e-3, 50e-3])).unwrap();
+    let probed = Prober::new(&mut arm, &cell, &params, &mut StaticScan::new(plate_scan(1))).probe(&HOLE);
+    assert_eq!(probed.ending, Ending::ToleranceReached);
+    let hole = probed.found.as_ref().unwrap().feature.as_ref().unwrap();
+    let off = hole.centre.value - Point3::new(16e-3, 36e-3, 12e-3);
+    let diameter = hole.diameter.as_ref().unwrap().value - 8e-3;
+    println!("centre {:.1} µm off, diameter {:.1} µm", off.norm() * 1e6, diameter * 1e6);
+    assert!(off.norm() < 50e-6 && diameter.abs() < 50e-6, "{off} {diameter}");
+    let state = arm.next_state().unwrap();
+    assert_eq!(state.joints.len(), 7);
+    let reported = cell.geometry.flange(&state.joints) * cell.pose_ft;
+    // 10 µm of noise in each axis
+    assert!((reported.translation.vector - state.pose_bt.translation.vector).norm() < 60e-6);
+    for (joint, angle) in chain.joints().iter().zip(state.joints.iter()) {
+        assert!(joint.range.is_some_and(|[low, high]| (low..=high).contains(angle)), "{}: {angle}", joint.name);
+    }
 }
 
 #[test]
