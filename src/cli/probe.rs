@@ -169,6 +169,8 @@ reported! {
         flag: u32 = id,
         touches: usize = plan.touches.len(),
         unreachable_touches: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::touch).collect(),
+        /// places of the surface that are not touched, for the scan has no part there
+        beside_the_part_mm: Vec<[f64; 3]> = plan.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         slides: usize = plan.slides.len(),
         unreachable_slides: Vec<Unreachable> = plan.held_back.iter().filter_map(Unreachable::slide).collect(),
     }
@@ -215,6 +217,10 @@ impl fmt::Display for DryRunReport {
             }
             let unreachable = one.unreachable_touches.len() + one.unreachable_slides.len();
             writeln!(f, " planned, {unreachable} cannot be made")?;
+            if !one.beside_the_part_mm.is_empty() {
+                let places = counted(one.beside_the_part_mm.len(), "place", "places");
+                writeln!(f, "  {places} left out: the scan has no part there")?;
+            }
             for (kind, unreachable) in [("touch", &one.unreachable_touches), ("slide", &one.unreachable_slides)] {
                 for Unreachable { number, reason } in unreachable {
                     writeln!(f, "  {kind} {number}: {reason}")?;

@@ -253,7 +253,7 @@ mod tests {
         <joint name="lift" type="revolute"><parent link="l1"/><child link="l2"/><origin rpy="1.5707963267948966 0 0"/><axis xyz="0 0 2"/>
           <limit lower="-6.28" upper="6.28" velocity="3" effort="1"/></joint>
         <joint name="elbow" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="-0.425 0 0"/><axis xyz="0 0 1"/>
-          <limit lower="-3.14" upper="3.14" velocity="3" effort="1"/></joint>
+          <limit lower="-3.1" upper="3.1" velocity="3" effort="1"/></joint>
         <joint name="w1" type="revolute"><parent link="l3"/><child link="l4"/><origin xyz="-0.3922 0 0.1333"/><axis xyz="0 0 1"/>
           <limit lower="-6.28" upper="6.28" velocity="3" effort="1"/></joint>
         <joint name="w2" type="revolute"><parent link="l4"/><child link="l5"/><origin xyz="0 -0.0997 0" rpy="1.5707963267948966 0 0"/>
@@ -274,7 +274,7 @@ mod tests {
         let chain = chain_of(UR5E, "", &LINKS).unwrap();
         let names: Vec<_> = chain.joints().iter().map(|joint| &*joint.name).collect();
         assert_eq!(names, ["pan", "lift", "elbow", "w1", "w2", "w3"]);
-        assert_eq!(chain.joints()[2].range, Some([-3.14, 3.14]));
+        assert_eq!(chain.joints()[2].range, Some([-3.1, 3.1]));
         assert_eq!(chain.joints()[5].range, None);
         for joints in [[0.0; 6], [0.3, -1.2, 1.4, -0.9, 1.1, 0.4], [-2.0, 0.4, -1.1, 2.2, -0.7, 3.0]] {
             let difference =
@@ -307,7 +307,7 @@ mod tests {
         let wrong = |from: &str, to: &str| error_of(&UR5E.replacen(from, to, 1), &LINKS);
         let prismatic = wrong(r#"name="elbow" type="revolute""#, r#"name="elbow" type="prismatic""#);
         assert!(prismatic.starts_with("joint `elbow`, line 10: it is of type `prismatic`"), "{prismatic}");
-        assert!(wrong(r#"lower="-3.14""#, "").contains("joint `elbow`, line 10: it is revolute and has no limit"));
+        assert!(wrong(r#"lower="-3.1""#, "").contains("joint `elbow`, line 10: it is revolute and has no limit"));
         assert!(wrong(r#"<axis xyz="0 0 2"/>"#, r#"<axis xyz="0 0"/>"#).contains("joint `lift`, line 8: its axis"));
         assert!(wrong(r#"<parent link="l3"/>"#, r#"<parent link="nowhere"/>"#).contains("they end at `nowhere`"));
         assert!(wrong(r#"<parent link="base"/>"#, r#"<parent link="tool0"/>"#).contains("no joints lead down"));

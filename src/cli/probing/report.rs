@@ -29,6 +29,9 @@ reported! {
         /// the touches that do not count, and why
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         rejected_touches: Vec<RejectedTouch> = probed.touches.iter().enumerate().filter_map(RejectedTouch::of).collect(),
+        /// places of the surface that were not touched, for the scan has no part there
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        beside_the_part_mm: Vec<[f64; 3]> = probed.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         slides: Vec<SlideRecordOfFile> = probed.slides.iter().map(SlideRecordOfFile::of).collect(),
         duration_s: f64 = probed.seconds,

@@ -11,10 +11,13 @@ use touchup::features::fit::{
     Cylinder, Ends, FREEDOMS, FitParams, Freedom, Observation, Plane, Stadium, Steps, Surface, fit,
 };
 use touchup::features::{Kind, Measured};
+use touchup::mesh::TriMesh;
 use touchup::probing::plan::{
     Asked, Candidate, ExploreError, Explorer, Found, Knowledge, PatternParams, TouchPlan, TouchResult,
 };
 use touchup::sim::{Plate, Surface as _};
+
+use crate::plate_stream::plate_scan;
 
 const SIGMA: f64 = 5e-6;
 
@@ -404,13 +407,14 @@ fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan, ball: f64,
 fn explored(
     kind: Kind,
     flag: Point3<f64>,
+    scan: &TriMesh,
     distance: &dyn Fn(&Point3<f64>) -> f64,
     rng: &mut Pcg64,
 ) -> Result<Found, ExploreError> {
     let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
     let mut lean = || rng.random_range(-0.05..0.05);
     let normal = Unit::new_normalize(Vector3::new(lean(), lean(), 1.0));
-    let mut explorer = Explorer::new(Some(kind), &flag, &normal, params).unwrap();
+    let mut explorer = Explorer::new(Some(kind), &flag, &normal, params, scan).unwrap();
     while let Some(planned) = explorer.next_touch() {
         let noise: f64 = StandardNormal.sample(rng);
         explorer.take(&probe(distance, &planned, params.ball_radius, noise * SIGMA));
@@ -430,7 +434,9 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     let (mut claimed, mut worst, count) = (0, 0.0f64, 100);
     for _ in 0..count {
         let flag = SLOT + Vector3::new(rng.random_range(-9e-3..9e-3), rng.random_range(-3e-3..3e-3), 0.0);
-        let Ok(found) = explored(Kind::Slot, flag, &|p| plate.signed_distance(p), &mut rng) else { continue };
+        let Ok(found) = explored(Kind::Slot, flag, &plate_scan(1), &|p| plate.signed_distance(p), &mut rng) else {
+            continue;
+        };
         if !found.is_as_asked {
             continue;
         }
@@ -462,7 +468,7 @@ fn an_obstacle_in_a_slot_is_not_its_end() {
         );
         let distance = |p: &Point3<f64>| plate.signed_distance(p).min((p.x - x).hypot(p.y - y) - radius);
         let flag = Point3::new(rng.random_range(20e-3..23e-3), 14e-3, TOP);
-        let found = explored(Kind::Slot, flag, &distance, &mut rng);
+        let found = explored(Kind::Slot, flag, &plate_scan(1), &distance, &mut rng);
         assert!(!found.as_ref().is_ok_and(|found| found.is_as_asked), "pin at {x} {y}, {radius}: {found:?}");
     }
 }
@@ -479,7 +485,7 @@ fn a_slot_without_ends_is_reported_as_such() {
     };
     for _ in 0..10 {
         let flag = Point3::new(0.0, rng.random_range(-2e-3..2e-3), TOP);
-        let found = explored(Kind::Slot, flag, &distance, &mut rng);
+        let found = explored(Kind::Slot, flag, &flat([-100.0, 100.0], [-100.0, 100.0]), &distance, &mut rng);
         assert!(matches!(found, Err(ExploreError::NoEnd { .. })), "{found:?}");
     }
 }
@@ -492,7 +498,7 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let mut claimed = 0;
     for _ in 0..50 {
         let flag = Point3::new(16e-3 + rng.random_range(-2e-3..2e-3), 36e-3 + rng.random_range(-2e-3..2e-3), TOP);
-        let mut explorer = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), params).unwrap();
+        let mut explorer = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
         let mut walls = 0;
         while let Some(planned) = explorer.next_touch() {
             walls += usize::from(planned.direction.z.abs() < 0.5);
@@ -522,7 +528,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
     for missed in 0..3 {
         let flag = truth + Vector3::new(1e-3, -0.5e-3, 4e-3);
         let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
-        let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params).unwrap();
+        let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
         let mut walls = 0;
         while let Some(planned) = explorer.next_touch() {
             let is_wall = planned.direction.z.abs() < 0.5;
@@ -537,4 +543,100 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
         assert!((boss.centre.value - truth).xy().norm() < 50e-6, "{missed}: {}", boss.centre.value);
         assert!((boss.diameter.unwrap().value - 10e-3).abs() < 50e-6, "{missed}");
     }
+}
+
+/// The top of a scan that has lost all openings: a rectangle at the height of the plate, mm.
+fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
+    let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
+    let corners = corners.map(|[x, y]| Point3::new(x * 1e-3, y * 1e-3, TOP));
+    TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+}
+
+/// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from it, m.
+fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
+    let (half, middle) = (Vector3::new(20e-3, 15e-3, 6e-3), Vector3::new(20e-3, 15e-3, 6e-3));
+    let off = (p.coords - middle).abs() - half;
+    let block = off.sup(&Vector3::zeros()).norm() + off.max().min(0.0);
+    let about = |half: f64| ((p.x - 13e-3).abs() - half).max(0.0).hypot(p.y - 6e-3);
+    match kind {
+        // Ø 8, 2 mm from the edge
+        Some(Kind::Hole) => block.max(4e-3 - about(0.0)),
+        // 18 × 6, 4 mm deep, 3 mm from the edge
+        Some(Kind::Slot) => block.max((3e-3 - about(6e-3)).min(p.z - 8e-3)),
+        // Ø 8, 5 mm high, 2 mm from the edge
+        Some(Kind::Boss) => {
+            let (beside, above) = (about(0.0) - 4e-3, (p.z - 17e-3).max(10e-3 - p.z));
+            block.min(if beside > 0.0 && above > 0.0 { beside.hypot(above) } else { beside.max(above) })
+        }
+        _ => block,
+    }
+}
+
+/// Features 2 to 3 mm from the edges of a part, and an edge and a plane that end near their flags: all are measured, and no touch goes down
+/// beside the part. The scan is 0.3 mm too large on all sides, and knows of no opening. Without its outline, as if the part went on on
+/// all sides, touches go there.
+#[test]
+fn no_touch_is_planned_beside_the_part() {
+    let scan = flat([-0.3, 40.3], [-0.3, 30.3]);
+    let endless = flat([-100.0, 100.0], [-100.0, 100.0]);
+    let (mut beside, mut lost) = ([Vec::new(), Vec::new()], Vec::new());
+    for (kind, flagged) in [
+        (Some(Kind::Hole), [13.0, 6.0, 12.0]),
+        (Some(Kind::Slot), [13.0, 6.0, 12.0]),
+        (Some(Kind::Boss), [13.0, 6.0, 17.0]),
+        (Some(Kind::Edge), [0.0, 4.0, 12.0]),
+        (Some(Kind::Plane), [3.0, 3.0, 12.0]),
+        (None, [3.0, 3.0, 12.0]),
+    ] {
+        for seed in 0..10 {
+            for (which, scan) in [&scan, &endless].into_iter().enumerate() {
+                let mut rng = Pcg64::seed_from_u64(seed);
+                let (turn, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..2e-3));
+                let flag = Point3::from(flagged.map(|mm| mm * 1e-3)) + Vector3::new(turn.cos(), turn.sin(), 0.0) * off;
+                let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+                let mut explorer = Explorer::new(kind, &flag, &Vector3::z_axis(), params, scan).unwrap();
+                while let Some(planned) = explorer.next_touch() {
+                    let from = planned.from;
+                    // within a cell of the outline, 0.2 mm
+                    let is_over = (-0.5e-3..40.5e-3).contains(&from.x) && (-0.5e-3..30.5e-3).contains(&from.y);
+                    // a wall that is touched from outside ends where the part does
+                    let is_wall = kind == Some(Kind::Edge) && planned.direction.z.abs() < 0.5;
+                    if planned.direction.z < -0.9 && !is_over || is_wall && from.y < -0.5e-3 {
+                        beside[which].push(format!("{kind:?} seed {seed}, flag {flag}: {planned:?}"));
+                    }
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    explorer.take(&probe(&|p| near_edges(kind, p), &planned, params.ball_radius, noise * SIGMA));
+                }
+                if which == 1 {
+                    continue;
+                }
+                let found = explorer.found();
+                let truth = match kind {
+                    Some(Kind::Edge) => Vector3::new(0.0, f64::NAN, TOP),
+                    Some(Kind::Plane) => Vector3::new(f64::NAN, f64::NAN, TOP),
+                    _ => Vector3::new(13e-3, 6e-3, TOP),
+                };
+                let is_found = match (&found, kind) {
+                    (Ok(found), None) => found.touches > 20,
+                    (Ok(Found { feature: Some(feature), .. }), _) => {
+                        let off = (feature.centre.value.coords - truth).map(|off| if off.is_nan() { 0.0 } else { off });
+                        off.norm() < 40e-6
+                    }
+                    _ => false,
+                };
+                if !is_found {
+                    lost.push(format!("{kind:?} seed {seed}, flag {flag}: {found:?}"));
+                }
+            }
+        }
+    }
+    let [with, without] = beside;
+    println!(
+        "touches beside the part in 60 plans: {} with the outline of the scan, {} without",
+        with.len(),
+        without.len()
+    );
+    assert!(lost.is_empty(), "{}", lost.join("\n"));
+    assert!(with.is_empty(), "{}", with.join("\n"));
+    assert!(without.len() > 60, "{}", without.len());
 }

@@ -26,7 +26,9 @@ pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
         0 => {
             let slides =
                 if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
-            (ProbeResult::PLANNED, format!("{} touches{slides} planned; the path is published", plan.touches.len()))
+            let beside = beside_the_part(plan.left_out.len());
+            let touches = plan.touches.len();
+            (ProbeResult::PLANNED, format!("{touches} touches{slides} planned{beside}; the path is published"))
         }
         _ => {
             let held_back: Vec<String> = plan.held_back.iter().map(ToString::to_string).collect();
@@ -42,7 +44,7 @@ pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
     let unknown = refused(target, 0, String::new());
     ProbeResult {
         code: code_of(&probed.ending),
-        message: probed.ending.to_string() + &slid(&probed.slides),
+        message: probed.ending.to_string() + &beside_the_part(probed.left_out.len()) + &slid(&probed.slides),
         feature: feature.map_or(unknown.feature.clone(), |feature| {
             let message = found(feature, target.id, Some(target.radius));
             match code_of(&probed.ending) {
@@ -57,6 +59,11 @@ pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
         touch_count: probed.touches.len() as u32,
         ..unknown
     }
+}
+
+/// How many places were left out, in words.
+fn beside_the_part(count: usize) -> String {
+    if count == 0 { String::new() } else { format!("; places left out, for the scan has no part there: {count}") }
 }
 
 /// How the slides ended, behind how the probing did.

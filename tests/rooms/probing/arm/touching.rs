@@ -12,6 +12,8 @@ use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult}
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
 use touchup::stylus::Wrench;
 
+use crate::plate_stream::plate_scan;
+
 /// Distance of the ball's centre from its contact, m.
 type Error = Box<dyn Fn(&Point3<f64>) -> f64>;
 /// Whether an error names the true cause.
@@ -178,7 +180,9 @@ fn a_hole_is_found_from_one_click_and_measured() {
         let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
         let flag = Point3::new(x + off * angle.cos(), y + off * angle.sin(), TOP + rng.random_range(-0.5e-3..0.5e-3));
         let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [x, y, 30e-3])).unwrap();
-        let mut search = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
+        let mut search =
+            Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1))
+                .unwrap();
         let peak = explored(&mut arm, &params, &touching, &mut search);
         let found = search.found().unwrap();
         let feature = found.feature.as_ref().unwrap();
@@ -208,7 +212,8 @@ fn where_no_hole_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 8e-3, TOP);
-    let mut search = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
+    let mut search =
+        Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1)).unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
     assert!(matches!(search.found(), Err(ExploreError::NotFound { .. })), "{:?}", search.found());
 }
@@ -575,7 +580,7 @@ fn explored_from(kind: Kind, near: Point3<f64>, seed: u64, params: PatternParams
     let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
     let flag = near + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), rng.random_range(-0.5e-3..0.5e-3));
     let mut arm = SimArm::new(&plate, arm_params.clone(), &at(&arm_params, [near.x, near.y, 30e-3])).unwrap();
-    let mut search = Explorer::new(Some(kind), &flag, &Vector3::z_axis(), params).unwrap();
+    let mut search = Explorer::new(Some(kind), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
     let peak = explored(&mut arm, &arm_params, &touching, &mut search);
     let found = search.found().unwrap_or_else(|error| panic!("{kind:?} {flag}, seed {seed}: {error}"));
     println!(
@@ -661,7 +666,8 @@ fn where_no_edge_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 9e-3, TOP);
-    let mut search = Explorer::new(Some(Kind::Edge), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
+    let mut search =
+        Explorer::new(Some(Kind::Edge), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1)).unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
     assert!(matches!(search.found(), Err(ExploreError::NoEdge { .. })), "{:?}", search.found());
 }

@@ -8,6 +8,8 @@ use touchup::probing::arm::{TouchOutcome, TouchParams, TouchTarget};
 use touchup::probing::plan::{Explorer, PatternParams};
 use touchup::sim::{ArmParams, Bounds, Plate, SimArm, Surface, SurfacePoint};
 
+use crate::plate_stream::plate_scan;
+
 use super::touching::{at, explored, touched};
 
 /// The plate turned about the middle of its slot.
@@ -94,7 +96,8 @@ fn a_slot_is_found_at_every_angle() {
             let start = at(&params, [MIDDLE[0], MIDDLE[1], 30e-3]);
             let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
             let mut search =
-                Explorer::new(Some(Kind::Slot), &flag, &Vector3::z_axis(), PatternParams::default()).unwrap();
+                Explorer::new(Some(Kind::Slot), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1))
+                    .unwrap();
             explored(&mut arm, &params, &touching, &mut search);
             let said = match search.found().map(|found| (found.touches, found.feature)) {
                 Err(error) => error.to_string(),

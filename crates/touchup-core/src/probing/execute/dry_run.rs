@@ -43,6 +43,8 @@ pub struct Plan {
     pub touches: Vec<TouchPlan>,
     /// the slides after them
     pub slides: Vec<Slide>,
+    /// places of the surface, m in O, that are not touched, for the scan has no part there
+    pub left_out: Vec<Point3<f64>>,
     /// what cannot be done
     pub held_back: Vec<HeldBack>,
 }
@@ -101,6 +103,7 @@ pub fn plan(
         plan.path.extend([planned.from, end, planned.from, at.place]);
         explorer.take(&result);
     }
+    plan.left_out = explorer.left_out().to_vec();
     let slides = if params.slides { explorer.slides() } else { Vec::new() };
     for slide in slides {
         let what = PlannedMotion::Slide(plan.slides.len());

@@ -107,6 +107,8 @@ pub struct Probed {
     pub touches: Vec<ProbedTouch>,
     /// and the slides after them
     pub slides: Vec<ProbedSlide>,
+    /// places of the surface, m in O, that were not touched, for the scan has no part there
+    pub left_out: Vec<Point3<f64>>,
     /// by the arm's clock, s
     pub seconds: f64,
     /// largest force on the tip, N

@@ -45,7 +45,8 @@ impl<'a> Prober<'a> {
             Ok(begun) => begun,
             Err(ending) => {
                 let (touches, slides) = (Vec::new(), Vec::new());
-                return Probed { flag: flag.id, ending, found: None, touches, slides, seconds: 0.0, peak_force: 0.0 };
+                let (found, left_out, seconds, peak_force) = (None, Vec::new(), 0.0, 0.0);
+                return Probed { flag: flag.id, ending, found, touches, slides, left_out, seconds, peak_force };
             }
         };
         let mut ended = probing.explore(&mut explorer);
@@ -70,6 +71,7 @@ impl<'a> Prober<'a> {
             peak_force: probing.peak_force,
             touches: probing.touches,
             slides: probing.slides,
+            left_out: explorer.left_out().to_vec(),
         }
     }
 

@@ -73,7 +73,7 @@ impl Flag {
         let place = on_mesh(world, &self.place);
         let normal = normal_about(world, &place, &cell.shaft(&now.pose_bt.rotation));
         let pattern = PatternParams { flag_radius: self.radius, ..params.pattern };
-        let explorer = Explorer::new(self.kind, &place, &normal, pattern)?;
+        let explorer = Explorer::new(self.kind, &place, &normal, pattern, world.mesh())?;
         Ok((explorer, cell.upright(&now.pose_bt.rotation, &normal)))
     }
 }

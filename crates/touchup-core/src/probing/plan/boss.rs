@@ -6,8 +6,8 @@ use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::error::ExploreError;
 use super::hole::numbers;
 use super::pattern::{Stage, Touched};
-use super::search::{AROUND, ROUGH};
-use super::search_context::{RING, SearchContext, TouchPlan, TouchResult, toward};
+use super::search::{DEEPEST, ROUGH};
+use super::search_context::{AROUND, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use crate::features::Feature;
 use crate::features::fit::Observation;
@@ -21,8 +21,6 @@ const LARGEST: f64 = 30e-3;
 const BESIDE: f64 = 1.2;
 /// The ball stays this far above the ground, m.
 const OFF_GROUND: f64 = 0.4e-3;
-/// Depth of the search for the ground, over the ball's radius.
-const GROUND: f64 = 5.0;
 /// The top is slid over so far towards its middle.
 const HALF: f64 = 0.5;
 /// Heights within this are of one surface, m.
@@ -85,7 +83,7 @@ impl BossPattern {
 
     fn take_out(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
         let ball = context.params.ball_radius;
-        let lowest = context.height - GROUND * ball;
+        let lowest = context.height - DEEPEST * ball;
         let z = touch.place.map_or(lowest, |place| context.below(&place));
         if touch.result != TouchResult::Unclear && context.height - z > BESIDE * ball {
             self.ground_z = self.ground_z.max(z);
@@ -115,22 +113,22 @@ impl BossPattern {
 }
 
 impl Stage for BossPattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
         let (middle, outward) = (self.wall.middle, RoundWall::first_direction(self.direction));
         Ok(Some(match self.phase {
-            BossPhase::Top => context.ring(self.around, context.params.flag_radius, clearance + GROUND * ball + ROUGH),
+            BossPhase::Top => context.ring(self.around, context.params.flag_radius, clearance + DEEPEST * ball + ROUGH),
             BossPhase::Out(distance) if distance > LARGEST || self.direction >= MOST_FIRST => {
                 return Err(self.wall.missing(self.direction + 1, LARGEST));
             }
-            BossPhase::Out(distance) => context.down(&(middle + outward * distance), clearance + GROUND * ball),
+            BossPhase::Out(distance) => context.down(&(middle + outward * distance), clearance + DEEPEST * ball),
             BossPhase::In(distance) => {
                 context.sideways(&(middle + outward * distance), self.depths(context)?[1], &-outward, distance)
             }
             BossPhase::Ground => {
                 let away = self.wall.radius(context) + 2.0 * BESIDE * ball;
-                let place = middle + toward((self.around as f64 + 0.5) / AROUND as f64) * away;
-                context.down(&place, clearance + GROUND * ball)
+                let place = context.around(self.around, 0.5, &middle, away);
+                context.down(&place, clearance + DEEPEST * ball)
             }
             BossPhase::Wall => return Ok(self.wall.next(context, self.depths(context)?)),
         }))

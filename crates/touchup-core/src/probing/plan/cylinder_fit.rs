@@ -122,7 +122,7 @@ impl RoundWall {
             Possible { point, travel, planned }
         });
         let wanted = self.wanted(context, &surface);
-        self.measuring.next(&surface, &wanted, possible.collect())
+        self.measuring.next(&surface, &wanted, context.on_part(possible))
     }
 
     /// The cylinder through the contacts of the wall, perpendicular to a surface.

@@ -17,6 +17,8 @@ use crate::numeric::mean;
 const BEYOND: f64 = 0.8;
 /// Places on the high side, back from the flag and along the edge, over the radius of the ring.
 const MORE: [[f64; 2]; 4] = [[0.5, -0.9], [0.5, 0.9], [1.3, -0.6], [1.3, 0.6]];
+/// Back from the flag where one of these is beside the part; along the edge as many steps to both sides.
+const ELSEWHERE: [f64; 4] = [0.5, 0.8, 1.1, 1.4];
 /// The ground is what was touched beyond this share of the farthest.
 const CLEAR: f64 = 0.7;
 /// Depth of the search for the ground, over the ball's radius.
@@ -29,6 +31,8 @@ const FIRST: usize = 3;
 const MOST_FIRST: usize = 6;
 /// They are this far apart along the edge, over the radius around the flag.
 const SPREAD: f64 = 1.0;
+/// Shares of that which are tried in turn where the edge ends before it.
+const NEARER: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 /// Touches along the edge reach this far to either side, over the same.
 const REACH: f64 = 2.0;
 /// Places along the edge that are candidates.
@@ -183,7 +187,7 @@ impl EdgePattern {
             let planned = context.down(&context.in_f(&point), clearance + ball_radius + ROUGH);
             Possible { point, travel: clearance, planned }
         };
-        Self::places(&context.params).flat_map(|along| TOP.map(|back| at(along, back))).collect()
+        context.on_part(Self::places(&context.params).flat_map(|along| TOP.map(|back| at(along, back))))
     }
 
     fn possible_side(&self, context: &SearchContext, side: &Plane, deep: f64) -> Vec<Possible> {
@@ -194,7 +198,8 @@ impl EdgePattern {
             let direction = context.pose_of.inverse_transform_vector(&-side.normal());
             Possible { point, travel: clearance, planned: context.sideways(&from, depth, &direction, 2.0 * clearance) }
         };
-        Self::places(&context.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))).collect()
+        context
+            .on_part(Self::places(&context.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))))
     }
 
     /// Of the top or of the side, whichever gains more.
@@ -211,15 +216,17 @@ impl EdgePattern {
 }
 
 impl Stage for EdgePattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let PatternParams { ball_radius: ball, clearance, flag_radius, .. } = context.params;
         let (ring, from_above) = (Self::ring(&context.params), clearance + GROUND * ball + ROUGH);
         Ok(Some(match self.phase {
             EdgePhase::NoEdge => return Err(ExploreError::NoEdge { radius_mm: ring * 1e3 }),
             EdgePhase::Ring => context.ring(self.tried, ring, from_above),
             EdgePhase::Top => {
-                let [back, along] = MORE[self.tried].map(|share| share * ring);
-                context.down(&(Point3::origin() - self.over * back + self.along() * along), from_above)
+                let place = |[back, along]: [f64; 2]| Point3::from((self.along() * along - self.over * back) * ring);
+                let others = ELSEWHERE.map(|back| ELSEWHERE.map(|along| place([back, 1.2 * along - 0.9])));
+                let place = context.over_part(self.tried, &MORE.map(place), others.as_flattened());
+                context.down(&place, from_above)
             }
             EdgePhase::Side if self.tried >= MOST_FIRST => {
                 let (walls, reach_mm) = (self.side.observations.len(), 2e3 * (ring + ball));
@@ -228,7 +235,11 @@ impl Stage for EdgePattern {
             EdgePhase::Side => {
                 // inward from beyond the edge
                 let (along, beyond) = ([0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius, ring + ball);
-                let from = Point3::origin() + self.over * beyond + self.along() * along;
+                // where the edge ends before that, nearer to the flag
+                let high = |along: f64| Point3::from(self.along() * along - self.over * ring);
+                let along =
+                    NEARER.map(|share| share * along).into_iter().find(|along| context.is_over_part(&high(*along)));
+                let from = Point3::from(self.over * beyond + self.along() * along.unwrap_or(0.0));
                 context.sideways(&from, self.depths(context)?[1], &-self.over, 2.0 * beyond)
             }
             EdgePhase::Both => return Ok(self.next_of_both(context, self.depths(context)?[1])),

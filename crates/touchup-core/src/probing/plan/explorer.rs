@@ -1,14 +1,19 @@
 //! A flagged feature, explored touch by touch.
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::error::ExploreError;
+use super::outline::Outline;
 use super::pattern::{Stage, Touched};
+use super::search::{DEEPEST, ROUGH};
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use super::{boss, edge, hole, plane, region, slot};
 use crate::features::fit::Observation;
 use crate::features::{Feature, Kind};
+use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
 
 /// What was found.
@@ -31,7 +36,7 @@ pub struct Found {
 }
 
 /// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch, [`Explorer::take`] takes its
-/// result, from an arm or by hand.
+/// result, from an arm or by hand. Nothing is planned beside the part, as the scan has it.
 #[derive(Debug)]
 pub struct Explorer {
     context: SearchContext,
@@ -53,6 +58,7 @@ const ROUNDING: f64 = 1e-9;
 impl Explorer {
     /// - `kind`: what it is; `None`: unknown. Pockets are explored as slots.
     /// - `flag`: about where, on the surface, m in O; `normal`: about that of the surface there.
+    /// - `scan`: the part as far as it is known, in O.
     ///
     /// # Errors
     /// [`ExploreError::NoPattern`], [`ExploreError::NoSuchNumber`].
@@ -61,6 +67,7 @@ impl Explorer {
         flag: &Point3<f64>,
         normal: &Unit<Vector3<f64>>,
         params: PatternParams,
+        scan: &TriMesh,
     ) -> Result<Self, ExploreError> {
         if !params.quantity.is_of(kind) {
             let kind = kind.map_or("unknown region", Kind::name);
@@ -79,13 +86,21 @@ impl Explorer {
         let (shared, wanted) = (params.shared_part(kind, flag, normal), params.sigma);
         // of the touches no more is asked than makes a difference
         let sigma = (wanted.powi(2) - shared.powi(2)).max(0.0).sqrt().max(LEAST_SHARE * shared);
-        let context = SearchContext { params: PatternParams { sigma, ..params }, pose_of, height: 0.0, touches: 0 };
+        let params = PatternParams { sigma, ..params };
+        let deep = params.depth.max(DEEPEST * params.ball_radius) + ROUGH;
+        let outline = Arc::new(Outline::new(scan, flag, normal, deep));
+        let context = SearchContext { params, pose_of, height: 0.0, touches: 0, outline, left_out: Vec::new() };
         Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared })
     }
 
     /// Touches so far.
     pub fn touches(&self) -> usize {
         self.context.touches
+    }
+
+    /// Places of the surface, m in O, that would have been touched, but where the scan has no part.
+    pub fn left_out(&self) -> &[Point3<f64>] {
+        &self.context.left_out
     }
 
     /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
@@ -99,13 +114,23 @@ impl Explorer {
         if self.ended.is_some() || self.context.touches >= self.context.params.budget {
             return None;
         }
-        let is_known = self.stage.is_known(&self.context);
-        match if is_known { Ok(None) } else { self.stage.next(&self.context) } {
-            Ok(Some(planned)) => self.asked = Some(planned),
-            Ok(None) => self.ended = Some(Ok(is_known)),
-            Err(error) => self.ended = Some(Err(error)),
+        while self.asked.is_none() && self.ended.is_none() {
+            let is_known = self.stage.is_known(&self.context);
+            match if is_known { Ok(None) } else { self.stage.next(&mut self.context) } {
+                Ok(Some(planned)) if self.context.is_beside(&planned) => self.leave_out(planned),
+                Ok(Some(planned)) => self.asked = Some(planned),
+                Ok(None) => self.ended = Some(Ok(is_known)),
+                Err(error) => self.ended = Some(Err(error)),
+            }
         }
         self.asked
+    }
+
+    /// The scan says what would be met there: nothing.
+    fn leave_out(&mut self, planned: TouchPlan) {
+        self.context.leave_out(&self.context.in_f(&planned.from));
+        let (result, is_left_out) = (TouchResult::Nothing, true);
+        self.stage.take(&mut self.context, &Touched { planned, result, is_left_out, place: None, observation: None });
     }
 
     /// Paths on which the ball slides over the whole feature; none where nothing was found, or where a ball has no room.
@@ -126,7 +151,8 @@ impl Explorer {
             TouchResult::Nothing | TouchResult::Unclear => None,
         };
         let place = observation.map(|contact| self.context.in_f(&contact.point));
-        self.stage.take(&mut self.context, &Touched { planned, result: *result, place, observation });
+        let is_left_out = false;
+        self.stage.take(&mut self.context, &Touched { planned, result: *result, is_left_out, place, observation });
     }
 
     /// What was found, once [`Self::next_touch`] plans nothing more.

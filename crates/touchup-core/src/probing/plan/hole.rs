@@ -11,8 +11,8 @@ use nalgebra::{Point3, Vector3};
 use super::cylinder_fit::{FIRST, MOST_FIRST, RoundWall, surface_about};
 use super::error::ExploreError;
 use super::pattern::{Stage, Touched};
-use super::search::{AROUND, BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
-use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult, toward};
+use super::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
+use super::search_context::{AROUND, PatternParams, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use crate::features::fit::Observation;
 use crate::features::{End, Feature};
@@ -76,7 +76,7 @@ impl HolePattern {
 }
 
 impl Stage for HolePattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let (ball, middle) = (context.params.ball_radius, self.wall.middle);
         Ok(Some(match self.phase {
             HolePhase::Opening => self.opening.next(context)?,
@@ -87,7 +87,7 @@ impl Stage for HolePattern {
             HolePhase::Floor => context.sideways(&middle, SHALLOW * ball, &-Vector3::z(), REACH),
             HolePhase::Around => {
                 let away = self.wall.radius(context) + BESIDE * ball;
-                let place = middle + toward(self.around as f64 / AROUND as f64) * away;
+                let place = context.around(self.around, 0.0, &middle, away);
                 context.down(&place, context.params.clearance + 2.0 * ball + ROUGH)
             }
             HolePhase::Wall => return Ok(self.wall.next(context, [BELOW_RIM * ball, self.depth])),

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
 use super::pattern::Touched;
-use super::search_context::{Expected, PatternParams, Quantity, TouchPlan, TouchResult};
+use super::search_context::{Expected, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
 use crate::features::fit::{FitParams, Freedom, Observation, Plane, Surface, fit};
 
 /// A candidate touch: where the surface would be touched, and how.
@@ -14,6 +14,21 @@ pub(super) struct Possible {
     /// with the ball's centre so far from where the search begins, m
     pub travel: f64,
     pub planned: TouchPlan,
+}
+
+/// The scan has to have a part so far behind a wall that is touched, m.
+const BEHIND: f64 = 0.3e-3;
+
+impl SearchContext {
+    /// Those of the candidates that the scan has a part for: all around a touch from above, behind a wall that is touched.
+    pub fn on_part(&self, possible: impl IntoIterator<Item = Possible>) -> Vec<Possible> {
+        let is_part = |p: &Possible| {
+            let (behind, radius) =
+                if self.is_down(&p.planned) { (0.0, self.params.ball_radius) } else { (BEHIND, 0.0) };
+            self.outline.is_part(&(p.point + p.planned.direction.into_inner() * behind), radius)
+        };
+        possible.into_iter().filter(is_part).collect()
+    }
 }
 
 /// What is wanted of a surface, and what is believed of it before it is touched.

@@ -14,6 +14,8 @@ use crate::features::fit::Observation;
 pub(super) struct Touched {
     pub planned: TouchPlan,
     pub result: TouchResult,
+    /// whether it was not made, for the scan has no part there: then as if nothing was met
+    pub is_left_out: bool,
     /// centre of the ball in F, where it was stopped
     pub place: Option<Point3<f64>>,
     pub observation: Option<Observation>,
@@ -25,7 +27,7 @@ pub(super) trait Stage: Debug + Send {
     ///
     /// # Errors
     /// [`ExploreError`] when there is no such feature.
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError>;
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError>;
     /// Takes the result of the touch.
     fn take(&mut self, context: &mut SearchContext, touch: &Touched);
     /// The feature, as far as it is known.

@@ -54,12 +54,12 @@ impl PlanePattern {
             travel: clearance,
             planned: context.down(place, search),
         };
-        self.places.iter().map(at).collect()
+        context.on_part(self.places.iter().map(at))
     }
 }
 
 impl Stage for PlanePattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let possible = self.possible(context);
         if self.first < FIRST {
             // a third of a turn apart, near the rim

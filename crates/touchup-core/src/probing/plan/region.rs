@@ -39,7 +39,7 @@ impl RegionPattern {
 }
 
 impl Stage for RegionPattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let PatternParams { clearance, ball_radius, depth, .. } = context.params;
         Ok(self.places.last().map(|place| context.down(place, clearance + ball_radius + depth.max(ROUGH))))
     }

@@ -21,10 +21,11 @@ const FLAT: f64 = 30e-6;
 /// What the scan says of the height may be off by this, m.
 pub(super) const ROUGH: f64 = 1.5e-3;
 
+/// Touches from above reach this far below the surface at most, over the ball's radius.
+pub(super) const DEEPEST: f64 = 5.0;
+
 /// The wall of an opening is searched this far, m.
 pub(super) const REACH: f64 = 12e-3;
-/// Touches of the surface around an opening, or of the ground around a foot.
-pub(super) const AROUND: usize = 4;
 /// They are this far beyond the wall, over the ball's radius.
 pub(super) const BESIDE: f64 = 1.3;
 /// So far beyond the wall the surface is no rim any more, m.
@@ -86,22 +87,26 @@ impl OpeningSearch {
     ///
     /// # Errors
     /// [`ExploreError::NotFound`] when all have been tried.
-    pub fn next(&self, context: &SearchContext) -> Result<TouchPlan, ExploreError> {
+    pub fn next(&mut self, context: &mut SearchContext) -> Result<TouchPlan, ExploreError> {
         let PatternParams { ball_radius, clearance, .. } = context.params;
         let step = STEP * ball_radius;
-        let is_new =
-            |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
-        let deepest = self
-            .tried
-            .iter()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, depth)| *depth > context.params.beyond(SUNK));
+        let sunk = context.params.beyond(SUNK);
+        let deepest = self.tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, depth)| *depth > sunk);
         let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
         let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
         let places = hexagonal(step, Self::farthest(&context.params));
-        let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)));
-        let best = best.ok_or_else(|| Self::not_found(&context.params))?;
-        Ok(context.down(best, clearance + SHALLOW * ball_radius + ROUGH))
+        loop {
+            let is_new =
+                |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
+            let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)));
+            let best = best.ok_or_else(|| Self::not_found(&context.params))?;
+            if context.is_over_part(best) {
+                return Ok(context.down(best, clearance + SHALLOW * ball_radius + ROUGH));
+            }
+            // over the edge of the part a ball sinks as over an opening
+            context.leave_out(best);
+            self.tried.push((*best, 0.0));
+        }
     }
 
     /// Takes a touch; the place where the ball fell in, if it did.
@@ -109,7 +114,7 @@ impl OpeningSearch {
         let wanted = context.in_f(&touch.planned.from);
         let wanted = Point3::new(wanted.x, wanted.y, 0.0);
         match (touch.result, touch.place, touch.observation) {
-            (TouchResult::Nothing, ..) => return Some(wanted),
+            (TouchResult::Nothing, ..) if !touch.is_left_out => return Some(wanted),
             (_, Some(place), Some(observation)) => {
                 let surface = context.below(&place);
                 // the highest is the surface; what is lower is a rim, or lower ground

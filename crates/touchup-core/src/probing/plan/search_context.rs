@@ -1,10 +1,12 @@
 //! The request of a search, the touches that it plans, their results, and the frame of the search.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::arm_uncertainty::ArmUncertainty;
+use super::outline::Outline;
 use crate::features::fit::Observation;
 use crate::features::{End, Kind};
 use crate::{names, parameters};
@@ -156,9 +158,64 @@ pub(super) struct SearchContext {
     /// of the surface in F
     pub height: f64,
     pub touches: usize,
+    /// of the scan, seen along the normal at the flag
+    pub outline: Arc<Outline>,
+    /// places of the surface, in O, that were not touched, for the scan has no part there
+    pub left_out: Vec<Point3<f64>>,
 }
 
+/// A touch from above goes down the normal within this (cosine).
+const DOWN: f64 = 0.99;
+
 impl SearchContext {
+    pub fn is_down(&self, planned: &TouchPlan) -> bool {
+        planned.direction.dot(&self.out()) < -DOWN
+    }
+
+    /// Whether a touch would go down beside the part.
+    pub fn is_beside(&self, planned: &TouchPlan) -> bool {
+        self.is_down(planned) && !self.outline.is_part(&planned.from, 0.0)
+    }
+
+    /// Notes that a place of F is not touched.
+    pub fn leave_out(&mut self, place: &Point3<f64>) {
+        self.left_out.push(self.pose_of * Point3::new(place.x, place.y, self.height));
+    }
+
+    /// Whether all of the ball is over the part at a place of F.
+    pub fn is_over_part(&self, place: &Point3<f64>) -> bool {
+        self.outline.is_part(&(self.pose_of * place), self.params.ball_radius)
+    }
+
+    /// One of several places of F that are touched from above; where it is beside the part, the place of others that is over it and
+    /// farthest from all that are touched.
+    pub fn over_part(&mut self, at: usize, wanted: &[Point3<f64>], others: &[Point3<f64>]) -> Point3<f64> {
+        let mut taken: Vec<_> = wanted.iter().filter(|place| self.is_over_part(place)).copied().collect();
+        for (index, place) in wanted.iter().enumerate().take(at + 1) {
+            let near = |p: &Point3<f64>| taken.iter().map(|t| (t - p).norm()).fold(f64::INFINITY, f64::min);
+            let other = others.iter().filter(|p| self.is_over_part(p) && near(p) > self.params.ball_radius);
+            let farthest = other.max_by(|a, b| near(a).total_cmp(&near(b))).copied();
+            match farthest.filter(|_| !self.is_over_part(place)) {
+                Some(farthest) if index == at => {
+                    self.leave_out(place);
+                    return farthest;
+                }
+                other => taken.extend(other),
+            }
+        }
+        wanted[at]
+    }
+
+    /// One of [`AROUND`] places of F around a middle, or elsewhere around it where that one is beside the part.
+    ///
+    /// - `first`: so many of their steps from x to the first; `away`: from the middle, m.
+    pub fn around(&mut self, at: usize, first: f64, middle: &Point3<f64>, away: f64) -> Point3<f64> {
+        let place = |at: usize, count: usize| middle + toward((at as f64 + first) / count as f64) * away;
+        let [wanted, others] =
+            [AROUND, DIRECTIONS].map(|count| (0..count).map(|at| place(at, count)).collect::<Vec<_>>());
+        self.over_part(at, &wanted, &others)
+    }
+
     pub fn out(&self) -> Vector3<f64> {
         self.pose_of.rotation * Vector3::z()
     }
@@ -201,6 +258,11 @@ impl SearchContext {
         End { point: contact.point - self.out() * contact.offset, sigma: contact.sigma }
     }
 }
+
+/// Touches of the surface around an opening, or of the ground around a foot …
+pub(super) const AROUND: usize = 4;
+/// … and the directions that are looked at where they would go beside the part.
+const DIRECTIONS: usize = 24;
 
 /// Places around the flag, beside the flag itself.
 pub(super) const RING: usize = 6;

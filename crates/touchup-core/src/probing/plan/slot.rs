@@ -16,8 +16,8 @@ use super::error::ExploreError;
 use super::hole::numbers;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::{Stage, Touched};
-use super::search::{AROUND, BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
-use super::search_context::{PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
+use super::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
+use super::search_context::{AROUND, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::{RimStation, Slide, stadium_rim};
 use super::slot_fit::SlotFit;
 use crate::features::fit::{Ends, Freedom, Stadium, Surface, fit};
@@ -172,7 +172,7 @@ impl SlotPattern {
             let point = walls.pose_of * (Point3::new(x, 0.0, -depth) + direction * radius);
             Possible { point, travel, planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND) }
         };
-        places.flat_map(|place| depths.map(|depth| planned(place, depth))).collect()
+        context.on_part(places.flat_map(|place| depths.map(|depth| planned(place, depth))))
     }
 
     fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
@@ -245,10 +245,15 @@ impl SlotPattern {
     }
 }
 
+/// From −1 to 1 in even steps.
+fn spread(at: usize, count: usize) -> f64 {
+    at as f64 / (count - 1) as f64 * 2.0 - 1.0
+}
+
 /// Places around the walls of a slot: along each side, then about the middle of each end; x of the middle line that a place is touched
 /// from, and the angle towards it.
 pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f64, f64)> {
-    let spread = move |at: usize| at as f64 / (count - 1) as f64 * 2.0 - 1.0;
+    let spread = move |at: usize| spread(at, count);
     let sides = (0..count).flat_map(move |at| [-PI, PI].map(|turn| (spread(at) * half, turn / 2.0)));
     let ends = (0..count).flat_map(move |at| {
         let angle = spread(at) * PI / 3.0;
@@ -258,7 +263,7 @@ pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f
 }
 
 impl Stage for SlotPattern {
-    fn next(&mut self, context: &SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
+    fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let ball = context.params.ball_radius;
         let shallow = SHALLOW * ball;
         match self.phase {
@@ -278,9 +283,15 @@ impl Stage for SlotPattern {
         Ok(Some(match self.phase {
             SlotPhase::Around => {
                 // beside both walls, towards both ends
-                let [x, y] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]][self.tried];
-                let side = Vector3::new(x * walls.length / 3.0, y * (walls.width / 2.0 + BESIDE * ball), 0.0);
-                context.down(&(centre + in_f(side)), context.params.clearance + 2.0 * ball + ROUGH)
+                let away = walls.width / 2.0 + BESIDE * ball;
+                let beside = |x: f64, y: f64| centre + in_f(Vector3::new(x * walls.length / 3.0, y * away, 0.0));
+                let wanted = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| beside(x, y));
+                // elsewhere beside it, and beyond its ends
+                let beyond =
+                    [-1.0, 1.0].map(|x| centre + in_f(Vector3::x() * x * (walls.length / 2.0 + BESIDE * ball)));
+                let others = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|y| beside(1.5 * spread(at, ALONG), y)));
+                let place = context.over_part(self.tried, &wanted, &others.chain(beyond).collect::<Vec<_>>());
+                context.down(&place, context.params.clearance + 2.0 * ball + ROUGH)
             }
             SlotPhase::End(..) if self.tried >= SEARCHES => return Err(ExploreError::NoEnd { searches: self.tried }),
             SlotPhase::End(sign, beyond) => {
