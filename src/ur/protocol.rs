@@ -130,7 +130,7 @@ impl UrState {
     pub fn slowed(&self) -> Option<Slowed> {
         let is_reduced = self.safety_bits & REDUCED_BIT != 0;
         let is_slow = is_reduced || self.speed_fraction < FULL;
-        is_slow.then(|| Slowed { slider_percent: self.speed_fraction * 100.0, is_reduced })
+        is_slow.then_some(Slowed { slider_percent: self.speed_fraction * 100.0, is_reduced })
     }
 
     /// Whether it does what it is ordered to.

@@ -531,7 +531,7 @@ fn urdf_of_seven_joints() -> String {
             r#"<link name="link{number}"/><joint name="j{number}" type="revolute"><parent link="{}"/><child link="link{number}"/>
             <origin xyz="0 0 0.1" rpy="{} 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>"#,
             if number == 1 { "base_link".to_owned() } else { format!("link{}", number - 1) },
-            if number % 2 == 0 { quarter } else { -quarter },
+            if number.is_multiple_of(2) { quarter } else { -quarter },
         )
     };
     format!(r#"<robot name="seven"><link name="base_link"/>{}</robot>"#, (1..=7).map(joint).collect::<String>())

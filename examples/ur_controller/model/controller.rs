@@ -174,7 +174,7 @@ impl<'a> Controller<'a> {
     }
 
     fn take_orders(&mut self) {
-        while let Some((_, written)) = self.coming_orders.pop_front_if(|(at, _)| *at <= self.body.time) {
+        while let Some(written) = due(&mut self.coming_orders, self.body.time) {
             for register in written {
                 match register {
                     Written::Int(0, id) => self.hear(id),
@@ -187,7 +187,7 @@ impl<'a> Controller<'a> {
 
     /// The next states that have come to the client.
     pub fn sent(&mut self) -> Option<States> {
-        self.coming_states.pop_front_if(|(at, _)| *at <= self.body.time).map(|(_, states)| states)
+        due(&mut self.coming_states, self.body.time)
     }
 
     /// The client has written the register of commands.
@@ -436,4 +436,10 @@ impl<'a> Controller<'a> {
             self.coming_states.push_back((self.body.time + states_late, states));
         }
     }
+}
+
+/// The first of what is on its way, where its time has come.
+fn due<T>(coming: &mut VecDeque<(f64, T)>, now: f64) -> Option<T> {
+    let is_due = coming.front().is_some_and(|(at, _)| *at <= now);
+    is_due.then(|| coming.pop_front()).flatten().map(|(_, what)| what)
 }

@@ -16,7 +16,6 @@ use crate::clock::ManualClock;
 use crate::probing::arm::{
     Arm, ArmError, ArmState, Command, Limits, Observer, ProbeError, Safety, TouchParams, TouchTarget, Watched,
 };
-use crate::sim::{ArmParams, Plate, WEIGHTLESS};
 use crate::stylus::Payload;
 use crate::ur::UrParams;
 use crate::ur::arm::{PERIOD, order_of, seen};
@@ -25,6 +24,7 @@ use crate::ur::freshness::Freshness;
 use crate::ur::guard::{ClientLoss, GuardState};
 use crate::ur::params::Deadlines;
 use crate::ur::protocol::{ProgramState, vector_of};
+use touchup::sim::{ArmParams, Plate, WEIGHTLESS};
 
 #[path = "../../../../examples/ur_controller/model/mod.rs"]
 #[expect(dead_code, reason = "what the wire alone needs")]
@@ -41,6 +41,10 @@ const STEP: Duration = Duration::from_millis(2);
 const READY: Duration = Duration::from_secs(3);
 /// Top of the plate, m in O.
 const TOP: f64 = 12e-3;
+/// A hung program whose motion is slower than this is not seen to disobey: it cannot be told from the noise of a measured velocity, m/s.
+const UNSEEN: f64 = 5e-3;
+/// Without a dashboard the arm stands within this, s: the watchdog of the controller, and its brakes.
+const WATCHDOG: f64 = 0.12;
 /// Where the dashboard is mute, the most that a resumed arm goes before it is braked, m.
 const MUTE_WAY: f64 = 2e-3;
 
@@ -108,11 +112,18 @@ impl<'a> World<'a> {
         self.controller.borrow().body.time
     }
 
+    /// The next line of the script, where its time has come.
+    fn due(&self, now: f64) -> Option<String> {
+        let mut script = self.script.borrow_mut();
+        let is_due = script.front().is_some_and(|(at, _)| *at <= now);
+        is_due.then(|| script.pop_front()).flatten().map(|(_, line)| line)
+    }
+
     /// One period of the controller, and what follows from it at once.
     fn step(&self) {
         self.hand.advance(STEP);
         let mut controller = self.controller.borrow_mut();
-        while let Some((_, line)) = self.script.borrow_mut().pop_front_if(|(at, _)| *at <= controller.body.time) {
+        while let Some(line) = self.due(controller.body.time) {
             happen(&mut controller, &line);
             self.is_dropped.set(self.is_dropped.get() || line == "drop" || line == "die");
             self.has_dashboard.set(self.has_dashboard.get() && line != "undash" && line != "die");
@@ -437,9 +448,9 @@ impl Outcome {
         self.record.iter().rfind(|moment| moment.speed > 0.0).map_or(0.0, |moment| moment.time)
     }
 
-    /// How far it went later than some time (s) after the report, m, and until when after it, s.
-    fn after_report(&self, since: f64) -> (f64, f64) {
-        let later = self.record.iter().filter(|moment| moment.time > self.at + since);
+    /// How far it went later than some time (s) after the report, faster than some speed (m/s), m; and until when after it, s.
+    fn after_report(&self, since: f64, least: f64) -> (f64, f64) {
+        let later = self.record.iter().filter(|moment| moment.time > self.at + since && moment.speed > least);
         let way = later.map(|moment| moment.speed * STEP.as_secs_f64()).sum();
         (way, self.stood_at() - self.at)
     }
@@ -511,7 +522,6 @@ fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
         arm.step();
     }
     drop(arm);
-    drop(library);
     Outcome { error, at, touches, record: world.record.take() }
 }
 
@@ -530,6 +540,10 @@ struct Kind {
 const UNHEARD: &[&str] =
     &["has ended", "has not returned", "are ordered", "refused a call", "has come", "did not arrive"];
 
+/// The same where the thread of the motion lives: a press goes on until its force is over the limit.
+const STILL_PRESSING: &[&str] =
+    &["has ended", "has not returned", "are ordered", "refused a call", "has come", "did not arrive", "over the limit"];
+
 const KINDS: &[Kind] = &[
     Kind { line: "pause", ends: "resume", stands: Some(0.05), reasons: &["was paused"] },
     Kind { line: "open", ends: "shut", stands: Some(0.05), reasons: &["by the operator", "was paused"] },
@@ -545,7 +559,7 @@ const KINDS: &[Kind] = &[
     Kind { line: "unplug", ends: "mend", stands: Some(0.2), reasons: &["has come", "states came", "has ended"] },
     Kind { line: "deaf", ends: "mend", stands: Some(0.2), reasons: UNHEARD },
     Kind { line: "stuck", ends: "mend", stands: Some(0.2), reasons: UNHEARD },
-    Kind { line: "hung", ends: "mend", stands: None, reasons: UNHEARD },
+    Kind { line: "hung", ends: "mend", stands: None, reasons: STILL_PRESSING },
     Kind { line: "tired", ends: "mend", stands: None, reasons: UNHEARD },
     Kind {
         line: "late states 40",
@@ -590,16 +604,23 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         }
         // a program that nobody could end is resumed: the client brakes it, or its watchdog ends it
         let (since, most) = if is_mute { (0.0, MUTE_WAY) } else { (0.2, 0.0) };
-        let (way, until) = outcome.after_report(since);
+        let is_hung = faults.iter().any(|(kind, ..)| kind.line == "hung");
+        let (way, until) = outcome.after_report(since, if is_hung { UNSEEN } else { 0.0 });
         if way > most {
             let (way, until) = (way * 1e3, until * 1e3);
             return Some(format!("{way:.2} mm after the report, until {until:.0} ms after it: {words}"));
         }
     }
+    let is_mute_or_unplugged = is_mute || faults.iter().any(|(kind, ..)| kind.line == "unplug");
     for (kind, at, length) in faults {
         let late = outcome.stood_at() - at;
         let is_resumed = is_mute && matches!(kind.line, "pause" | "open");
-        if let Some(most) = kind.stands.filter(|most| !is_resumed && length > most && late > *most) {
+        // without a dashboard its watchdog stops it
+        let most = kind.stands.map(|most| if is_mute_or_unplugged { most.max(WATCHDOG) } else { most });
+        // what another one ends was there for a shorter time
+        let mends = faults.iter().filter(|(other, ..)| other.ends == "mend").map(|(_, at, length)| at + length);
+        let lasts = mends.filter(|end| end > at).map(|end| end - at).fold(*length, f64::min);
+        if let Some(most) = most.filter(|most| !is_resumed && lasts > *most && late > *most) {
             return Some(format!("`{}`: stands after {:.0} of {:.0} ms", kind.line, late * 1e3, most * 1e3));
         }
     }

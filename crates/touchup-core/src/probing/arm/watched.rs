@@ -124,6 +124,8 @@ const TURN_SPEED: f64 = 0.2;
 const PATIENCE: (f64, f64) = (3.0, 2.0);
 /// Below this the tip is free of what it met, N …
 const FREE_N: f64 = 1.0;
+/// … and where it grows by this on the way back the tip goes no farther, N: several deviations of its noise …
+const WORSE_N: f64 = 2.0;
 /// … to which it goes back with this speed, m/s …
 const FREEING: f64 = 2e-3;
 /// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
@@ -305,10 +307,13 @@ impl<'a> Watched<'a> {
         self.stand(doing, &self.hard_stop(), &mut |_| {})?;
         let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
         let (Some(way), false) = (way, self.last.as_ref().is_none_or(is_free)) else { return Ok(()) };
-        let mut free = 0;
+        let met_n = self.last.map_or(0.0, |state| state.wrench_b.force.norm());
+        let (mut free, mut worse) = (0, 0);
         self.search(doing, way * -FREEING, FREEING_WAY, &mut |state| {
             free = if is_free(state) { free + 1 } else { 0 };
-            free >= TRIGGERS
+            // what was met is not that way, or was no contact
+            worse = if state.wrench_b.force.norm() > met_n + WORSE_N { worse + 1 } else { 0 };
+            free >= TRIGGERS || worse >= TRIGGERS
         })?;
         self.stand(doing, &self.stop(), &mut |_| {})
     }
