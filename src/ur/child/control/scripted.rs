@@ -41,8 +41,6 @@ const STEP: Duration = Duration::from_millis(2);
 const READY: Duration = Duration::from_secs(3);
 /// Top of the plate, m in O.
 const TOP: f64 = 12e-3;
-/// A hung program whose motion is slower than this is not seen to disobey: it cannot be told from the noise of a measured velocity, m/s.
-const UNSEEN: f64 = 5e-3;
 /// Without a dashboard the arm stands within this, s: the watchdog of the controller, and its brakes.
 const WATCHDOG: f64 = 0.12;
 /// Where the dashboard is mute, the most that a resumed arm goes before it is braked, m.
@@ -448,9 +446,9 @@ impl Outcome {
         self.record.iter().rfind(|moment| moment.speed > 0.0).map_or(0.0, |moment| moment.time)
     }
 
-    /// How far it went later than some time (s) after the report, faster than some speed (m/s), m; and until when after it, s.
-    fn after_report(&self, since: f64, least: f64) -> (f64, f64) {
-        let later = self.record.iter().filter(|moment| moment.time > self.at + since && moment.speed > least);
+    /// How far it went later than some time (s) after the report, m; and until when after it, s.
+    fn after_report(&self, since: f64) -> (f64, f64) {
+        let later = self.record.iter().filter(|moment| moment.time > self.at + since);
         let way = later.map(|moment| moment.speed * STEP.as_secs_f64()).sum();
         (way, self.stood_at() - self.at)
     }
@@ -604,8 +602,7 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         }
         // a program that nobody could end is resumed: the client brakes it, or its watchdog ends it
         let (since, most) = if is_mute { (0.0, MUTE_WAY) } else { (0.2, 0.0) };
-        let is_hung = faults.iter().any(|(kind, ..)| kind.line == "hung");
-        let (way, until) = outcome.after_report(since, if is_hung { UNSEEN } else { 0.0 });
+        let (way, until) = outcome.after_report(since);
         if way > most {
             let (way, until) = (way * 1e3, until * 1e3);
             return Some(format!("{way:.2} mm after the report, until {until:.0} ms after it: {words}"));
