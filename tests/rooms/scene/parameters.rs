@@ -96,6 +96,7 @@ robot.tolerance_mm mm 0.02 0.0001 10
 robot.confidence - 0.95 0.5 0.9999
 robot.touches touches 39 1 10000
 robot.touch_sigma_mm mm 0.005 1e-5 1
+robot.square_sigma_deg degrees 0.13 1e-3 20
 robot.radius_sigma_mm mm 0.001 0 10
 robot.place_sigma_mm mm 0 0 100
 robot.turn_sigma_deg degrees 0 0 20

@@ -273,6 +273,36 @@ fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
     }
 }
 
+/// The way out of the hole leans into its wall, by 0.25 mm at the rim: pressed in by that the ball would feel 3.75 N. It goes off the wall and
+/// on.
+#[test]
+fn a_wall_beside_the_way_out_is_no_obstacle() {
+    let (plate, params) = (Plate::default(), ArmParams::default());
+    let touching = TouchParams { stiffness: params.stiffness, ..TouchParams::default() };
+    let wall = HOLE.0[0] + HOLE.1 - params.radius;
+    let inside = at(&params, [wall - 50e-6, HOLE.0[1], TOP - 6e-3]);
+    let above = at(&params, [wall + 0.5e-3, HOLE.0[1], TOP + 5e-3]);
+    let mut arm = SimArm::new(&plate, params, &inside).unwrap();
+    let mut seen = ForceSeen::default();
+    let mut watched = Watched::new(&mut arm, limits(), &mut seen);
+    watched.zero().unwrap();
+    watched.leave("going up", &above, touching.link_speed, &touching).unwrap();
+    let ended = arm.next_state().unwrap().pose_bt.translation.vector;
+    let off = ended - above.translation.vector;
+    assert!(off.z.abs() < 0.1e-3 && off.norm() < 0.6e-3, "{off}");
+    assert!((1.5..3.0).contains(&seen.0), "{} N", seen.0);
+}
+
+/// The largest force, N.
+#[derive(Default)]
+struct ForceSeen(f64);
+
+impl Observer for ForceSeen {
+    fn on_state(&mut self, state: &ArmState) {
+        self.0 = self.0.max(state.wrench_b.force.norm());
+    }
+}
+
 /// An arm whose states somebody changes.
 struct Altered<'a, F: FnMut(&mut ArmState)> {
     arm: SimArm<'a>,

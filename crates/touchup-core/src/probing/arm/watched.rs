@@ -130,6 +130,12 @@ const WORSE_N: f64 = 2.0;
 const FREEING: f64 = 2e-3;
 /// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
 const FREEING_WAY: f64 = 5e-3;
+/// A force with less than this share along the way comes from a surface beside it: the way back is along that surface as well.
+const BESIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// So often on one way the tip is freed of what is beside it, and goes on …
+const GRAZES: u32 = 3;
+/// … this much farther from it than where it was free, m: more than the noise of its place.
+const OFF: f64 = 0.1e-3;
 /// A sensor is looked at for so long before it is zeroed, s.
 const STEADY: f64 = 0.1;
 /// In which its mean may change by this, N …
@@ -291,10 +297,12 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more.
+    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more; of a surface beside the way, off that surface.
+    ///
+    /// Returns how far beside the way it is to go on, m in B, where it went aside and is free.
     ///
     /// - `command`: that led to the contact.
-    pub(super) fn come_free(&mut self, command: &Command) -> Result<(), ProbeError> {
+    pub(super) fn come_free(&mut self, command: &Command) -> Result<Option<Vector3<f64>>, ProbeError> {
         let (heeds, doing) = (self.heeds, "coming free of what it met");
         (self.comes_free, self.heeds) = (true, StopRequest::Stay);
         let met = self.last.map(|state| state.pose_bt.translation.vector);
@@ -303,19 +311,28 @@ impl<'a> Watched<'a> {
         freed
     }
 
-    fn stop_and_free(&mut self, doing: &'static str, way: Option<Vector3<f64>>) -> Result<(), ProbeError> {
+    fn stop_and_free(
+        &mut self,
+        doing: &'static str,
+        way: Option<Vector3<f64>>,
+    ) -> Result<Option<Vector3<f64>>, ProbeError> {
         self.stand(doing, &self.hard_stop(), &mut |_| {})?;
         let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
-        let (Some(way), false) = (way, self.last.as_ref().is_none_or(is_free)) else { return Ok(()) };
-        let met_n = self.last.map_or(0.0, |state| state.wrench_b.force.norm());
+        let (Some(way), Some(stood)) = (way, self.last.filter(|state| !is_free(state))) else { return Ok(None) };
+        let (push, met_n) = (stood.wrench_b.force, stood.wrench_b.force.norm());
+        let along = push.dot(&way);
+        let aside = (push - way * along).try_normalize(0.0).filter(|_| along.abs() < BESIDE * met_n);
         let (mut free, mut worse) = (0, 0);
-        self.search(doing, way * -FREEING, FREEING_WAY, &mut |state| {
+        self.search(doing, aside.unwrap_or(-way) * FREEING, FREEING_WAY, &mut |state| {
             free = if is_free(state) { free + 1 } else { 0 };
             // what was met is not that way, or was no contact
             worse = if state.wrench_b.force.norm() > met_n + WORSE_N { worse + 1 } else { 0 };
             free >= TRIGGERS || worse >= TRIGGERS
         })?;
-        self.stand(doing, &self.stop(), &mut |_| {})
+        self.stand(doing, &self.stop(), &mut |_| {})?;
+        let gone = |state: ArmState| state.pose_bt.translation.vector - stood.pose_bt.translation.vector;
+        let by = self.last.filter(is_free).map(gone).zip(aside);
+        Ok(by.map(|(gone, aside)| aside * (gone.dot(&aside).max(0.0) + OFF)))
     }
 
     /// Goes straight to a pose through what should be free air.
@@ -332,10 +349,16 @@ impl<'a> Watched<'a> {
         params: &TouchParams,
         trigger: f64,
     ) -> Result<(), ProbeError> {
-        self.go(doing, to, speed, params, &mut |_| trigger)
+        match self.go(doing, to, speed, params, &mut |_| trigger)? {
+            None => Ok(()),
+            Some(met) => Err(met.obstacle(doing)),
+        }
     }
 
     /// As [`Self::line`], from where the tip may be in contact: once it is free, what it meets is an obstacle.
+    ///
+    /// A surface beside the way, as the wall of a hole that it goes up in, is none: the tip goes off it and on beside the way, and ends as far
+    /// beside `to`.
     ///
     /// # Errors
     /// As there.
@@ -346,13 +369,22 @@ impl<'a> Watched<'a> {
         speed: f64,
         params: &TouchParams,
     ) -> Result<(), ProbeError> {
-        let (mut is_free, most) = (false, self.limits.force);
-        self.go(doing, to, speed, params, &mut |force| {
-            is_free |= force < params.trigger;
-            if is_free { (UNEXPECTED * params.trigger).min(most) } else { most }
-        })
+        let (mut is_free, most, mut to) = (false, self.limits.force, *to);
+        let mut grazes = 0;
+        loop {
+            let met = self.go(doing, &to, speed, params, &mut |force| {
+                is_free |= force < params.trigger;
+                if is_free { (UNEXPECTED * params.trigger).min(most) } else { most }
+            })?;
+            let Some(met) = met else { return Ok(()) };
+            grazes += 1;
+            let Some(aside) = met.aside.filter(|_| grazes <= GRAZES) else { return Err(met.obstacle(doing)) };
+            to.translation.vector += aside;
+        }
     }
 
+    /// What it met before it arrived; it has come free of it.
+    ///
     /// - `trigger`: above which a force is an obstacle, N, where that much is felt now.
     fn go(
         &mut self,
@@ -361,7 +393,7 @@ impl<'a> Watched<'a> {
         speed: f64,
         params: &TouchParams,
         trigger: &mut dyn FnMut(f64) -> f64,
-    ) -> Result<(), ProbeError> {
+    ) -> Result<Option<Met>, ProbeError> {
         let place = to.translation.vector;
         self.limits.check_place(&place).map_err(|error| ProbeError::Limit { doing, error })?;
         let begun = self.next(doing)?;
@@ -382,13 +414,12 @@ impl<'a> Watched<'a> {
             let turn = state.pose_bt.rotation.angle_to(&to.rotation);
             ((here - place).norm() < THERE && turn < TURNED).then_some(None)
         })?;
-        let Some(here) = met else { return Ok(()) };
+        let Some(place) = met else { return Ok(None) };
         let before = std::mem::take(&mut self.peak_force);
-        self.come_free(&command)?;
+        let aside = self.come_free(&command)?;
         let force_n = self.peak_force;
         self.peak_force = before.max(force_n);
-        let (place_mm, is_link) = ((here * 1e3).into(), speed > params.safe_speed());
-        Err(ProbeError::Obstacle { doing, force_n, place_mm, is_link })
+        Ok(Some(Met { place, force_n, is_link: speed > params.safe_speed(), aside }))
     }
 
     /// Stops, waits until the arm is at rest, and zeroes the sensor.
@@ -490,6 +521,25 @@ impl<'a> Watched<'a> {
     pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
         self.send(doing, &self.hard_stop())?;
         Err(ProbeError::TooLong { doing, limit_s, slowed: self.arm.slowed() })
+    }
+}
+
+/// What was met on a way through free air.
+struct Met {
+    /// of the tip when it was felt, m in B
+    place: Vector3<f64>,
+    /// until the arm stood, N
+    force_n: f64,
+    /// whether that was in a fast move
+    is_link: bool,
+    /// so far beside the way it may go on, m in B
+    aside: Option<Vector3<f64>>,
+}
+
+impl Met {
+    fn obstacle(&self, doing: &'static str) -> ProbeError {
+        let Self { place, force_n, is_link, .. } = *self;
+        ProbeError::Obstacle { doing, force_n, place_mm: (place * 1e3).into(), is_link }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::cylinder_fit::SQUARE;
 use super::design::{Asked, Candidate, Knowledge};
 use super::search_context::toward;
 use super::slot::around_stadium;
@@ -27,6 +26,8 @@ const DOWN: [f64; 3] = [0.2, 0.5, 0.8];
 const UNKNOWN_DEPTH: f64 = 1.0;
 /// Standard deviation of one place, m, however often it is touched by hand: the error of the calibration is shared.
 const PLACE_SIGMA: f64 = 20e-6;
+/// Walls are perpendicular to the surface around them within this, rad.
+const SQUARE: f64 = 0.02;
 /// Enough is known when each number of the feature has this standard deviation, m.
 const ENOUGH: f64 = 10e-6;
 

@@ -1,6 +1,6 @@
 //! The wall of a hole or boss: its requested numbers, and its candidate touches.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{SQRT_2, TAU};
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -10,13 +10,17 @@ use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::Touched;
 use super::search_context::{Quantity, SearchContext, TouchPlan, toward};
 use super::slide::{RimStation, Slide};
-use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, fit};
+use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, Surface, fit};
 use crate::numeric::{NormalEquations, mean};
 
 /// Directions that are candidates.
 const DIRECTIONS: usize = 24;
-/// A hole is perpendicular to its surface within this, rad.
-pub(super) const SQUARE: f64 = 0.02;
+/// Walls lean when they do so by more than this many standard deviations.
+const LEANS: f64 = 4.0;
+/// … by so many touches more than there are unknowns: of fewer a single one that met something else makes a lean.
+const LEAST_DEGREES: usize = 6;
+/// … and then by no more than this, rad.
+const MOST_LEAN: f64 = 0.3;
 /// So many touches before it is believed.
 const LEAST_WALL: usize = 8;
 /// First directions.
@@ -80,6 +84,7 @@ impl RoundWall {
     fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
         let sigma = context.params.sigma;
         let asked = Asked::default();
+        let (lean, fit) = context.squareness(guess, &self.measuring.observations);
         let asked = match context.params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
@@ -89,9 +94,9 @@ impl RoundWall {
             }
         };
         Wanted {
-            before: Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), SQUARE),
+            before: Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), lean),
             asked: asked.and_the_rest::<Cylinder>(sigma, guess.radius),
-            fit: square(),
+            fit,
             least: LEAST_WALL,
             params: context.params,
         }
@@ -129,7 +134,9 @@ impl RoundWall {
     pub fn fitted(&self, context: &SearchContext, top: &Fit<Plane>) -> Result<Fit<Cylinder>, FitError> {
         let middle = self.guess(context).pose_of.translation.vector.into();
         let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
-        fit(&guess, &self.measuring.observations, &square())
+        let lean = top.axis_std().map_or(context.lean, |both| both / SQRT_2);
+        let (_, params) = SearchContext { lean, ..context.clone() }.squareness(&guess, &self.measuring.observations);
+        fit(&guess, &self.measuring.observations, &params)
     }
 
     /// Paths along the wall and across its rim.
@@ -145,9 +152,26 @@ impl RoundWall {
     }
 }
 
-/// Of walls that are perpendicular to their surface.
-pub(super) fn square() -> FitParams {
-    FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() }
+impl SearchContext {
+    /// What is known before of how much walls lean against z of F, rad in each of two directions, and how they are fitted: as perpendicular to
+    /// the surface, or freely where their touches say that they are not.
+    pub fn squareness<M: Surface>(&self, guess: &M, touches: &[Observation]) -> (f64, FitParams) {
+        let known = self.params.square.hypot(self.lean);
+        let freely = fit(guess, touches, &FitParams::default()).ok().filter(|free| free.degrees >= LEAST_DEGREES);
+        let leans = freely.is_some_and(|free| {
+            // how far its axis is off that of the guess, in the directions of its own x and y
+            let before = guess.pose_of().rotation * Vector3::z();
+            let off = free.surface.pose_of().inverse_transform_vector(&before);
+            let of = |lean: f64, std: Option<f64>| std.is_some_and(|std| lean.abs() > LEANS * std.hypot(known));
+            of(off.x, free.std(Freedom::TiltX)) || of(off.y, free.std(Freedom::TiltY))
+        });
+        if leans { (MOST_LEAN, FitParams::default()) } else { (known, square(known)) }
+    }
+}
+
+/// Of walls that are perpendicular to their surface within this, rad.
+fn square(sigma: f64) -> FitParams {
+    FitParams { axis_sigma: Some(sigma), ..FitParams::default() }
 }
 
 /// A wall is searched so much farther than expected, m.
@@ -174,4 +198,60 @@ fn circle_through(points: &[Point3<f64>]) -> Option<(Point3<f64>, f64)> {
     let radius = (solved.z + solved.x * solved.x + solved.y * solved.y).sqrt();
     let centre = Point3::new(mean.x + solved.x, mean.y + solved.y, 0.0);
     (radius.is_finite() && points.len() >= 3).then_some((centre, radius))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::probing::plan::outline::Outline;
+    use crate::probing::plan::search_context::PatternParams;
+
+    const BALL: f64 = 1.5e-3;
+
+    /// Centres of a ball that touches a hole of 8 mm, whose axis leans towards x by an angle, at two depths; by hand.
+    fn touches(lean: f64) -> Vec<Observation> {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean);
+        let place = |group: u32| {
+            let angle = TAU * f64::from(group) / 12.0;
+            let depth = if group % 2 == 0 { 1e-3 } else { 5e-3 };
+            let noise = 5e-6 * (7.0 * f64::from(group)).sin();
+            let point = turn * Point3::from(toward(angle / TAU) * (4e-3 - BALL + noise) - Vector3::z() * depth);
+            Observation { point, offset: BALL, sigma: 5e-6, group }
+        };
+        (0..12).map(place).collect()
+    }
+
+    /// A hole that is square within what is believed is fitted as one; one that leans by 5° is measured as it is.
+    #[test]
+    fn walls_that_lean_are_not_taken_for_square_ones() {
+        let scan = TriMesh::new(
+            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)],
+            vec![[0, 1, 2]],
+        );
+        let outline = Outline::new(&scan.unwrap(), &Point3::origin(), &Vector3::z_axis(), 5e-3).into();
+        let context = SearchContext {
+            params: PatternParams::default(),
+            pose_of: Isometry3::identity(),
+            lean: 1e-3,
+            height: 0.0,
+            touches: 0,
+            outline,
+            left_out: Vec::new(),
+        };
+        let guess = Cylinder::new(Point3::origin(), &Vector3::z(), 4e-3, true);
+        let known = PatternParams::default().square.hypot(1e-3);
+        let (sigma, params) = context.squareness(&guess, &touches(0.5 * known));
+        assert_eq!((sigma, params.axis_sigma), (known, Some(known)));
+        let leaning = touches(5f64.to_radians());
+        let (_, params) = context.squareness(&guess, &leaning);
+        assert_eq!(params.axis_sigma, None);
+        let axis = fit(&guess, &leaning, &params).unwrap().surface.axis();
+        let drawn = Vector3::new(5f64.to_radians().sin(), 0.0, 5f64.to_radians().cos());
+        assert!(axis.cross(&drawn).norm() < 3e-3, "{axis:?}");
+        // half of them: not enough to say so
+        assert_eq!(context.squareness(&guess, &leaning[..6]).1.axis_sigma, Some(known));
+    }
 }

@@ -21,6 +21,8 @@ const MORE: [[f64; 2]; 4] = [[0.5, -0.9], [0.5, 0.9], [1.3, -0.6], [1.3, 0.6]];
 const ELSEWHERE: [f64; 4] = [0.5, 0.8, 1.1, 1.4];
 /// The ground is what was touched beyond this share of the farthest.
 const CLEAR: f64 = 0.7;
+/// Where that is so high that it may be the rim, the ground is touched this much farther out, over the ball's radius.
+const FARTHER: f64 = 2.0;
 /// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 4.0;
 /// The ball stays this far above the ground, m.
@@ -54,6 +56,8 @@ enum EdgePhase {
     Top,
     /// the surface is the same all around
     NoEdge,
+    /// what was low may have been the rim: beyond it
+    Ground,
     Side,
     Both,
 }
@@ -137,7 +141,19 @@ impl EdgePattern {
         context.height =
             top.iter().map(|o| context.below(&context.in_f(&o.point))).sum::<f64>() / top.len().max(1) as f64;
         self.top.observations = top;
-        self.phase = if has_both { EdgePhase::Side } else { EdgePhase::NoEdge };
+        self.phase = match (has_both, self.depths(context)) {
+            (false, _) => EdgePhase::NoEdge,
+            (true, Ok(_)) => EdgePhase::Side,
+            (true, Err(_)) => EdgePhase::Ground,
+        };
+    }
+
+    /// A ball that hangs on the rim is less than its radius beyond the edge; farther out by more than that is the ground.
+    fn take_ground(&mut self, context: &SearchContext, touch: &Touched) {
+        if touch.result != TouchResult::Unclear {
+            self.ground_z = context.below(&touch.place.unwrap_or_else(|| context.in_f(&touch.planned.end())));
+        }
+        self.phase = EdgePhase::Side;
     }
 
     /// How far below the top the side is touched, m; at the highest and the deepest.
@@ -222,6 +238,7 @@ impl Stage for EdgePattern {
         Ok(Some(match self.phase {
             EdgePhase::NoEdge => return Err(ExploreError::NoEdge { radius_mm: ring * 1e3 }),
             EdgePhase::Ring => context.ring(self.tried, ring, from_above),
+            EdgePhase::Ground => context.down(&Point3::from(self.over * (ring + FARTHER * ball)), from_above),
             EdgePhase::Top => {
                 let place = |[back, along]: [f64; 2]| Point3::from((self.along() * along - self.over * back) * ring);
                 let others = ELSEWHERE.map(|back| ELSEWHERE.map(|along| place([back, 1.2 * along - 0.9])));
@@ -250,6 +267,7 @@ impl Stage for EdgePattern {
         match self.phase {
             EdgePhase::Ring | EdgePhase::NoEdge => self.take_ring(context, touch),
             EdgePhase::Top => self.take_top(context, touch),
+            EdgePhase::Ground => self.take_ground(context, touch),
             EdgePhase::Side => {
                 self.side.take(touch);
                 self.tried += 1;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
 use super::error::ExploreError;
+use super::level::UNTOUCHED;
 use super::outline::Outline;
 use super::pattern::{Stage, Touched};
 use super::search::{DEEPEST, ROUGH};
@@ -89,7 +90,8 @@ impl Explorer {
         let params = PatternParams { sigma, ..params };
         let deep = params.depth.max(DEEPEST * params.ball_radius) + ROUGH;
         let outline = Arc::new(Outline::new(scan, flag, normal, deep));
-        let context = SearchContext { params, pose_of, height: 0.0, touches: 0, outline, left_out: Vec::new() };
+        let (lean, left_out) = (UNTOUCHED, Vec::new());
+        let context = SearchContext { params, pose_of, lean, height: 0.0, touches: 0, outline, left_out };
         Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared })
     }
 

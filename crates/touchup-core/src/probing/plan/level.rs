@@ -1,9 +1,11 @@
 //! The true pose of the surface around a flag: until it was touched, only the scan gives its normal.
 
+use std::f64::consts::SQRT_2;
+
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
 use super::search_context::SearchContext;
-use crate::features::fit::Observation;
+use crate::features::fit::{FitParams, Observation, Plane, fit};
 use crate::numeric::{mean, scatter};
 
 /// Touches within this of a plane are of it, m.
@@ -11,6 +13,10 @@ const OF_PLANE: f64 = 60e-6;
 /// Three touches determine a plane when the triangle between them is at least this high, over the ball's radius.
 const SPREAD: f64 = 1.0;
 
+/// Standard deviation of the normal of the scan, in each of two directions, rad: near an edge that the scan has rounded it is off by 0.16.
+pub(super) const UNTOUCHED: f64 = 0.1;
+/// What is not of the plane lies off it by this many standard deviations.
+const GATE: f64 = 4.0;
 /// The normal of the scan is not wrong by more than this (cosine): 25°.
 const ALIKE: f64 = 0.9;
 
@@ -38,6 +44,8 @@ impl SearchContext {
         let height = self.height;
         self.pose_of = Isometry3::from_parts(origin.coords.into(), rotation);
         self.height = 0.0;
+        let plane = fit(&Plane::new(mean, &normal), &inliers, &FitParams::default()).ok();
+        self.lean = plane.and_then(|plane| plane.axis_std()).map_or(UNTOUCHED, |both| both / SQRT_2);
         for place in places {
             let moved = self.in_f(&(before * Point3::new(place.x, place.y, height)));
             **place = Point3::new(moved.x, moved.y, 0.0);
@@ -45,11 +53,12 @@ impl SearchContext {
         true
     }
 
-    /// Normal of the plane that most touches lie on, and those touches.
+    /// Normal of the plane that most touches lie on, and those touches: of the planes through three of them the one with the least truncated
+    /// squares \[Torr Zisserman 2000, MSAC\], where the normal of the scan counts as one more observation.
     fn most_plane(&self, observations: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
         let least = SPREAD * self.params.ball_radius;
         let of_plane = self.params.beyond(OF_PLANE);
-        let (mut best, mut most) = (Vec::new(), (0, 0.0));
+        let (mut best, mut least_cost) = (Vec::new(), f64::INFINITY);
         for (i, a) in observations.iter().enumerate() {
             for (j, b) in observations.iter().enumerate().skip(i + 1) {
                 for c in &observations[j + 1..] {
@@ -61,14 +70,15 @@ impl SearchContext {
                     }
                     let normal = area.normalize() * area.dot(&self.out()).signum();
                     let off = |o: &Observation| (o.point - a.point).dot(&normal);
-                    let inliers = || observations.iter().filter(|o| off(o).abs() < of_plane);
                     let is_allowed = !is_top || observations.iter().all(|o| off(o) < of_plane);
-                    // among equals the one that is most as the scan has it
-                    let score = (inliers().count(), normal.dot(&self.out()));
-                    let is_better = score.0 > most.0 || score.0 == most.0 && score.1 > most.1;
-                    if is_allowed && score.1 > ALIKE && is_better {
-                        most = score;
-                        best = inliers().copied().collect();
+                    let alike = normal.dot(&self.out());
+                    // −ln of the probability, without what is the same for all
+                    let of_touch = |o: &Observation| (off(o) / of_plane).powi(2).min(1.0) * GATE.powi(2) / 2.0;
+                    let turned = alike.clamp(-1.0, 1.0).acos() / UNTOUCHED;
+                    let cost = observations.iter().map(of_touch).sum::<f64>() + turned.powi(2) / 2.0;
+                    if is_allowed && alike > ALIKE && cost < least_cost {
+                        least_cost = cost;
+                        best = observations.iter().filter(|o| off(o).abs() < of_plane).copied().collect();
                     }
                 }
             }

@@ -37,6 +37,11 @@ parameters! {
         ///
         /// In m.
         touch_sigma: f64 = 0.005, "touch_sigma_mm" [MM, 1e-5, 1];
+        /// Standard uncertainty with which the walls of holes, slots and bosses are perpendicular to the surface around them, in each of two
+        /// directions, unless their touches say otherwise.
+        ///
+        /// In rad. 0.13° is 0.4 mm in 100 mm, the general tolerance K of ISO 2768-2, taken as a uniform distribution.
+        square: f64 = 0.13, "square_sigma_deg" [DEG, 1e-3, 20];
     }
     with {
         /// What all touches have in common.
@@ -155,6 +160,8 @@ pub(super) struct SearchContext {
     pub params: PatternParams,
     /// z out of the part, origin at the flag on the surface; maps the frame F of the search to O
     pub pose_of: Isometry3<f64>,
+    /// of its z from the normal of the surface, standard deviation in each of two directions, rad
+    pub lean: f64,
     /// of the surface in F
     pub height: f64,
     pub touches: usize,

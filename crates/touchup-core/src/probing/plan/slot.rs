@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
-use super::cylinder_fit::{SQUARE, square, surface_about};
+use super::cylinder_fit::surface_about;
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
@@ -103,8 +103,9 @@ impl SlotPattern {
         });
     }
 
-    fn wanted(params: &PatternParams, walls: &Stadium) -> Wanted {
-        let sigma = params.sigma;
+    fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
+        let params = &context.params;
+        let (sigma, (lean, fit)) = (params.sigma, context.squareness(walls, &self.measuring.observations));
         let asked = Asked::default();
         let asked = match params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
@@ -118,9 +119,9 @@ impl SlotPattern {
             }
         };
         Wanted {
-            before: Knowledge::before::<Stadium>(walls.length, SQUARE),
+            before: Knowledge::before::<Stadium>(walls.length, lean),
             asked: asked.and_the_rest::<Stadium>(sigma, walls.width / 2.0),
-            fit: square(),
+            fit,
             least: LEAST_WALL,
             params: *params,
         }
@@ -128,9 +129,10 @@ impl SlotPattern {
 
     /// The part of an end that was not touched yet: the sign of the end along the slot, and its angles. Touches that the fit holds
     /// for none of these walls do not count.
-    fn open_part(&self, walls: &Stadium) -> Option<(f64, [f64; 2])> {
+    fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let half = (walls.length - walls.width).max(0.0) / 2.0;
-        let fitted = fit(walls, &self.measuring.observations, &square()).ok();
+        let (_, params) = context.squareness(walls, &self.measuring.observations);
+        let fitted = fit(walls, &self.measuring.observations, &params).ok();
         let used = fitted.iter().flat_map(|fitted| &fitted.used);
         let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
         let kept: Vec<_> = kept.map(|(o, _)| walls.pose_of.inverse_transform_point(&o.point)).collect();
@@ -303,8 +305,8 @@ impl Stage for SlotPattern {
             SlotPhase::Floor => context.sideways(&centre, shallow, &-Vector3::z(), REACH),
             // those before have returned
             SlotPhase::Wall | SlotPhase::Opening | SlotPhase::First => {
-                let possible = self.possible(context, &walls, self.open_part(&walls));
-                let wanted = Self::wanted(&context.params, &walls);
+                let possible = self.possible(context, &walls, self.open_part(context, &walls));
+                let wanted = self.wanted(context, &walls);
                 return Ok(self.measuring.next(&walls, &wanted, possible));
             }
         }))
@@ -334,7 +336,8 @@ impl Stage for SlotPattern {
         let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
         let walls = self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
-        let fitted = fit(walls, &self.measuring.observations, &square())?;
+        let (_, params) = context.squareness(walls, &self.measuring.observations);
+        let fitted = fit(walls, &self.measuring.observations, &params)?;
         // where an end was not touched it has no length, and no middle
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
@@ -343,8 +346,8 @@ impl Stage for SlotPattern {
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let walls = self.walls.as_ref().filter(|_| self.phase == SlotPhase::Wall)?;
-        let is_determined = self.open_part(walls).is_none() && self.is_consistent(context, walls);
-        let known = || self.measuring.uncertainty(walls, &Self::wanted(&context.params, walls));
+        let is_determined = self.open_part(context, walls).is_none() && self.is_consistent(context, walls);
+        let known = || self.measuring.uncertainty(walls, &self.wanted(context, walls));
         is_determined.then(known).flatten()
     }
 
