@@ -194,6 +194,7 @@ impl GuardState {
                 (self.is_ready, self.fresh_at) = (true, Some(now));
                 // those of before have the pose of another tool
                 self.states.clear();
+                self.obedience = Obedience::new(now);
             }
             ClientReport::State(state) => {
                 (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
@@ -207,7 +208,7 @@ impl GuardState {
                 self.serve(state.served, now);
                 // what does not play is somebody else's, or stands
                 let disobeys = self.is_ready && !self.has_halted && state.may_move();
-                if let Some(fault) = disobeys.then(|| self.obedience.see(&state.velocity, now)).flatten() {
+                if let Some(fault) = disobeys.then(|| self.obedience.see(state.pose, &state.velocity, now)).flatten() {
                     return Some(ClientLoss::Arm(fault));
                 }
             }

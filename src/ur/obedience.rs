@@ -7,6 +7,9 @@
 //! order allows. An arm is late, by a time that no two arms share, but goes through the same velocities; so what it does now was
 //! ordered within the last [`WINDOW`], or is slower than that. While it presses, the velocity along the axis is its own, up to
 //! the speed that force mode has.
+//!
+//! A creep is slower than the noise of a velocity, so at rest the place counts: it may not leave where it was when rest had been ordered
+//! for [`WINDOW`]. Orders that stay away order rest, for the client brakes then.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -30,8 +33,14 @@ const TURN_NOISE: f64 = 50e-3;
 const TURN_WINDOW: Duration = Duration::from_millis(300);
 /// Force mode may be faster than it is set by this factor.
 const PRESS: f64 = 1.5;
-/// Deceleration of an arm that is to zero its sensor, m/s²: its driver brakes so.
+/// Deceleration of an arm that is to zero its sensor or hears nothing, m/s²: its driver brakes so.
 const REST: f64 = 2.0;
+/// An order that no other follows is in force for this long: then the client brakes.
+const FRESH: Duration = Duration::from_millis(25);
+/// At rest the tip stays where it is within this, m: ten times what a place is measured with.
+const CREEP: f64 = 0.1e-3;
+/// … and does not turn by more than this, rad.
+const CREEP_TURN: f64 = 2e-3;
 
 /// A velocity that was ordered once.
 #[derive(Clone, Copy, Debug)]
@@ -53,14 +62,25 @@ pub(super) struct Obedience {
     target: Vector3<f64>,
     /// m/s²
     acceleration: f64,
+    /// when the newest order went out
+    ordered_at: Instant,
     since: Option<Instant>,
+    /// where it has to stay, in B
+    rests_at: Option<Isometry3<f64>>,
 }
 
 impl Obedience {
     /// Of an arm at rest.
     pub fn new(now: Instant) -> Self {
         let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None };
-        Self { ordered: VecDeque::from([rest]), target: Vector3::zeros(), acceleration: REST, since: None }
+        Self {
+            ordered: VecDeque::from([rest]),
+            target: Vector3::zeros(),
+            acceleration: REST,
+            ordered_at: now,
+            since: None,
+            rests_at: None,
+        }
     }
 
     /// An order goes out.
@@ -77,7 +97,7 @@ impl Obedience {
             Action::Stop { deceleration } => (Vector3::zeros(), 0.0, deceleration, None),
             Action::Zero => (Vector3::zeros(), 0.0, REST, None),
         };
-        (self.target, self.acceleration) = (target, acceleration);
+        (self.target, self.acceleration, self.ordered_at) = (target, acceleration, now);
         let linear = self.newest().linear;
         self.push(Ordered { at: now, linear, turn, press });
     }
@@ -87,8 +107,20 @@ impl Obedience {
         self.ordered[self.ordered.len() - 1]
     }
 
-    /// The ordered velocity goes on until now.
+    /// The ordered velocity goes on until now, or until its order is too old.
     fn follow(&mut self, now: Instant) {
+        let stale = self.ordered_at + FRESH;
+        let goes = self.target != Vector3::zeros() || self.newest().turn > 0.0 || self.newest().press.is_some();
+        if goes && now > stale {
+            self.go_on(stale);
+            (self.target, self.acceleration) = (Vector3::zeros(), REST);
+            let linear = self.newest().linear;
+            self.push(Ordered { at: stale, linear, turn: 0.0, press: None });
+        }
+        self.go_on(now);
+    }
+
+    fn go_on(&mut self, now: Instant) {
         let last = self.newest();
         let room = self.acceleration * now.saturating_duration_since(last.at).as_secs_f64();
         let linear = last.linear + (self.target - last.linear).cap_magnitude(room);
@@ -105,8 +137,9 @@ impl Obedience {
 
     /// A state of the arm; returns the fault of one that does not do what it is ordered to.
     ///
+    /// - `pose`: place and rotation vector in B, m and rad;
     /// - `velocity`: m/s and rad/s in B.
-    pub fn see(&mut self, velocity: &[f64; 6], now: Instant) -> Option<ArmError> {
+    pub fn see(&mut self, pose: [f64; 6], velocity: &[f64; 6], now: Instant) -> Option<ArmError> {
         self.follow(now);
         let [x, y, z, a, b, c] = *velocity;
         let (linear, turn) = (Vector3::new(x, y, z), Vector3::new(a, b, c).norm());
@@ -116,17 +149,31 @@ impl Obedience {
         };
         let is_ordered = recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
         let most_turn = recent(TURN_WINDOW).map(|one| one.turn).fold(0.0, f64::max);
+        let rests = most_turn == 0.0 && recent(WINDOW).all(|one| one.linear == Vector3::zeros() && one.press.is_none());
+        let ordered_mm_per_s = self.newest().linear.norm() * 1e3;
+        let fault =
+            || ArmError::Disobeys { mm_per_s: linear.norm() * 1e3, ordered_mm_per_s, deg_per_s: turn.to_degrees() };
+        if self.creeps(rests, pose) {
+            return Some(fault());
+        }
         if is_ordered && turn <= most_turn * (1.0 + SHARE) + TURN_NOISE {
             self.since = None;
             return None;
         }
         let since = *self.since.get_or_insert(now);
-        let ordered_mm_per_s = self.newest().linear.norm() * 1e3;
-        (now.saturating_duration_since(since) > LASTING).then(|| ArmError::Disobeys {
-            mm_per_s: linear.norm() * 1e3,
-            ordered_mm_per_s,
-            deg_per_s: turn.to_degrees(),
-        })
+        (now.saturating_duration_since(since) > LASTING).then(fault)
+    }
+
+    /// Whether an arm that is to rest has left its place.
+    fn creeps(&mut self, rests: bool, pose: [f64; 6]) -> bool {
+        if !rests {
+            self.rests_at = None;
+            return false;
+        }
+        let pose = pose_of(pose);
+        let rests_at = self.rests_at.get_or_insert(pose);
+        let way = (pose.translation.vector - rests_at.translation.vector).norm();
+        way > CREEP || pose.rotation.angle_to(&rests_at.rotation) > CREEP_TURN
     }
 }
 
@@ -165,14 +212,26 @@ mod tests {
 
     const STOP: Action = Action::Stop { deceleration: 0.5 };
 
-    /// An order and a state each 2 ms; when the first fault is seen, ms.
+    /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow the velocity.
     fn first_fault(ms: u32, order: impl Fn(u32) -> Action, velocity: impl Fn(u32) -> [f64; 6]) -> Option<u32> {
+        first_fault_of(ms, |at| Some(order(at)), |at| ([0.0; 6], velocity(at)))
+    }
+
+    /// The same with the place, and orders that may stay away.
+    fn first_fault_of(
+        ms: u32,
+        order: impl Fn(u32) -> Option<Action>,
+        state: impl Fn(u32) -> ([f64; 6], [f64; 6]),
+    ) -> Option<u32> {
         let begun = Instant::now();
         let mut obedience = Obedience::new(begun);
         (0..ms).step_by(2).find(|&at| {
             let now = begun + at * MS;
-            let fault = obedience.see(&velocity(at), now);
-            obedience.order(&order(at), now);
+            let (pose, velocity) = state(at);
+            let fault = obedience.see(pose, &velocity, now);
+            if let Some(order) = order(at) {
+                obedience.order(&order, now);
+            }
             fault.is_some()
         })
     }
@@ -205,6 +264,39 @@ mod tests {
     fn an_arm_that_moves_without_an_order_is_seen_after_20_ms() {
         assert_eq!(first_fault(400, |_| STOP, |at| along(if at < 200 { 0.0 } else { 8e-3 })), Some(222));
         assert_eq!(first_fault(400, |_| STOP, |_| along(4e-3)), None, "the noise of its velocity");
+    }
+
+    /// 2 mm/s from the beginning, which is within the noise of the velocity; the place of the first state counts, and more than 0.1 mm
+    /// off it is the 26th after that.
+    #[test]
+    fn an_arm_that_creeps_where_rest_is_ordered_is_seen_after_a_tenth_of_a_millimetre() {
+        let creeping = |speed: f64| move |at: u32| (along(speed * f64::from(at) * 1e-3), along(speed));
+        assert_eq!(first_fault_of(400, |_| Some(STOP), creeping(2e-3)), Some(52));
+        // 0.1 mm/s: 1000 ms, and the state after
+        assert_eq!(first_fault_of(2000, |_| Some(STOP), creeping(0.1e-3)), Some(1002));
+        // rest is ordered from 0 ms on, counts 80 ms later, and 0.1 mm take 50 ms
+        let order = |at| Some(if at < 200 { go(2e-3) } else { STOP });
+        let seen = first_fault_of(600, order, creeping(2e-3)).unwrap();
+        assert!((320..=345).contains(&seen), "{seen} ms");
+        // the noise of a place, 10 um, and one that follows its order
+        let noisy = |at: u32| (along(if at % 4 == 0 { 30e-6 } else { -30e-6 }), along(0.0));
+        assert_eq!(first_fault_of(2000, |_| Some(STOP), noisy), None);
+        assert_eq!(first_fault_of(2000, |_| Some(go(2e-3)), creeping(2e-3)), None);
+        let turning = |at: u32| ([0.0, 0.0, 0.0, 0.0, 0.0, 0.02 * f64::from(at) * 1e-3], [0.0; 6]);
+        assert_eq!(first_fault_of(400, |_| Some(STOP), turning), Some(102), "2 mrad at 20 mrad/s");
+    }
+
+    /// 25 ms after the last order its client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then the 80 ms and the 20 ms.
+    #[test]
+    fn an_arm_that_goes_on_where_orders_stay_away_is_seen_within_140_ms() {
+        let order = |at| (at < 200).then(|| go(0.05));
+        let goes_on = |at: u32| ([0.0; 6], along(late(at.min(200), 0)));
+        let seen = first_fault_of(800, order, goes_on).unwrap();
+        assert!((300..=340).contains(&seen), "{seen} ms");
+        // one whose client brakes 6 ms late
+        let speed = |at: u32| (0.05_f64).min((0.05 - 2.0 * (f64::from(at) * 1e-3 - 0.231)).max(0.0));
+        let braked = |at: u32| ([0.0; 6], along(speed(at).min(late(at.min(200), 0))));
+        assert_eq!(first_fault_of(800, order, braked), None);
     }
 
     #[test]
