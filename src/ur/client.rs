@@ -160,6 +160,7 @@ impl Client {
         // at the end of its stdin it brakes, ends the program of the controller and itself
         self.orders = None;
         self.end_guard();
+        self.shared.ask_no_more();
         let closed = || ClientLoss::Arm(ArmError::Client { reason: reason.to_owned() });
         self.shared.known().broken.get_or_insert_with(closed);
     }

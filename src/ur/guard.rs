@@ -6,8 +6,9 @@
 
 use std::collections::VecDeque;
 use std::process::Child;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::dashboard::Dashboard;
@@ -23,6 +24,8 @@ const WAITING: usize = 64;
 pub(super) const ENDED: Duration = Duration::from_millis(40);
 /// Zeroing, with the braking before it, has this much time.
 pub(super) const ZEROING: Duration = Duration::from_secs(3);
+/// A dashboard that did not stop the arm is asked again this often.
+pub(super) const AGAIN: Duration = Duration::from_millis(100);
 /// The client ends by itself within this time of its stdin.
 pub(super) const FAREWELL: Duration = Duration::from_millis(1500);
 
@@ -84,11 +87,53 @@ pub(super) struct SharedGuard {
     pub known: Mutex<GuardState>,
     pub changed: Condvar,
     pub clock: Clock,
+    /// asks a dashboard that was mute
+    asker: Mutex<Option<Asker>>,
+}
+
+/// Asks a dashboard to stop the arm until it has done so, on connections of its own. Who lets it go waits for the answer on its way,
+/// so that it never stops the program of a later client.
+struct Asker {
+    over: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Asker {
+    fn begin(host: String, deadline: Duration) -> Self {
+        let (over, is_over) = channel();
+        let ask = move || {
+            while is_over.recv_timeout(AGAIN) == Err(RecvTimeoutError::Timeout) {
+                if Dashboard::connect(&host, deadline).and_then(|mut dashboard| dashboard.stop()).is_ok() {
+                    tracing::warn!("the dashboard, which had not answered, has stopped the program of the arm");
+                    break;
+                }
+            }
+        };
+        Self { over: Some(over), thread: Some(thread::spawn(ask)) }
+    }
+}
+
+impl Drop for Asker {
+    fn drop(&mut self) {
+        self.over = None;
+        // one that failed asks no more
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
 }
 
 impl SharedGuard {
     pub fn new(deadlines: Deadlines, clock: Clock) -> Self {
-        Self { known: Mutex::new(GuardState::new(deadlines, clock.now())), changed: Condvar::new(), clock }
+        Self {
+            known: Mutex::new(GuardState::new(deadlines, clock.now())),
+            changed: Condvar::new(),
+            clock,
+            asker: Mutex::default(),
+        }
+    }
+
+    /// Asks the dashboard no more.
+    pub fn ask_no_more(&self) {
+        *self.asker.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     pub fn known(&self) -> MutexGuard<'_, GuardState> {
@@ -329,7 +374,13 @@ impl Guard {
         match stopped {
             Ok(()) => Halt::Dashboard { took: self.shared.clock.since(begun) },
             Err(error) => {
-                tracing::error!(%error, "the arm cannot be stopped by its dashboard: its watchdog does it");
+                tracing::error!(
+                    %error,
+                    "the arm cannot be stopped by its dashboard: its watchdog does it, and the dashboard is asked again"
+                );
+                let asker = &self.shared.asker;
+                let mut asker = asker.lock().unwrap_or_else(PoisonError::into_inner);
+                asker.get_or_insert_with(|| Asker::begin(self.host.clone(), deadline));
                 Halt::Watchdog
             }
         }

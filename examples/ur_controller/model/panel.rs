@@ -50,6 +50,8 @@ pub fn happen(controller: &mut Controller, line: &str) {
             controller.is_remote = false;
             controller.stop_program("set to local control");
         }
+        ["on"] => controller.is_powered = true,
+        ["remote"] => controller.is_remote = true,
         ["halt"] => controller.stop_program("at the panel"),
         ["run", ms] => controller.grant(number(ms) * 1e-3),
         ["spike", force] => controller.body.hit(number(force)),

@@ -2,8 +2,6 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
-use std::sync::mpsc::{Sender, channel};
-use std::thread::{self, JoinHandle};
 
 use super::*;
 use crate::ur::dashboard::tests::listen;
@@ -362,6 +360,38 @@ fn a_program_that_somebody_pauses_is_ended_once() {
         assert!(watch.asked.try_recv().is_err() && watch.shared.known().broken.is_none());
         assert_eq!(watch.end_on_request(), None);
     }
+}
+
+/// The first connection never answers a request, each later one does.
+#[test]
+fn a_mute_dashboard_is_asked_until_it_has_stopped_the_arm() {
+    let (host, listener) = listen();
+    let (ask, asked) = channel();
+    let serve = thread::spawn(move || {
+        let mut connections = Vec::new();
+        for number in 0..3 {
+            let (mut socket, _) = listener.accept().unwrap();
+            writeln!(socket, "Connected: a test").unwrap();
+            let mut line = String::new();
+            BufReader::new(socket.try_clone().unwrap()).read_line(&mut line).unwrap();
+            ask.send((number, line)).unwrap();
+            if number == 2 {
+                writeln!(socket, "Stopped").unwrap();
+            }
+            connections.push(socket);
+        }
+    });
+    let deadlines = Deadlines { dashboard: 50 * MS, ..Deadlines::default() };
+    let (clock, _hand) = Clock::manual();
+    let dashboard = Dashboard::connect(&host, deadlines.dashboard).unwrap();
+    let shared = Arc::new(SharedGuard::new(deadlines, clock));
+    let child = Command::new("true").spawn().unwrap();
+    let mut guard = Guard { child, host, dashboard, shared: shared.clone(), hand: None };
+    assert_eq!(guard.halt(), Halt::Watchdog);
+    guard.child.wait().unwrap();
+    serve.join().unwrap();
+    assert_eq!(asked.iter().collect::<Vec<_>>(), [0, 1, 2].map(|number| (number, "stop\n".to_owned())));
+    shared.ask_no_more();
 }
 
 #[test]
