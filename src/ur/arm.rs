@@ -11,7 +11,9 @@ use super::dashboard::Dashboard;
 use super::error::UrError;
 use super::freshness::Freshness;
 use super::guard::Halt;
+use super::lateness::StartLateness;
 use super::params::UrParams;
+use super::priority;
 use super::probe::probe;
 use super::protocol::{Action, UrState, pose_of, vector_of};
 use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety, Slowed};
@@ -75,6 +77,20 @@ impl UrArm {
         if least_s > PERIOD * SAME_PERIOD {
             return Err(UrError::Rate { host: params.host.clone(), hz: 1.0 / least_s, needed_hz: 1.0 / PERIOD });
         }
+        let late = loop {
+            match client.late_at_start() {
+                Some(late) => break late,
+                None => last = next()?,
+            }
+        };
+        if !late.is_tolerable() {
+            let StartLateness { usual_ms, worst_ms } = late;
+            return Err(UrError::Busy { host: params.host.clone(), usual_ms, worst_ms });
+        }
+        tracing::info!(usual_ms = late.usual_ms, worst_ms = late.worst_ms, "states of the arm come late by");
+        if let Err(error) = priority::raise(priority::CALLER, false) {
+            tracing::warn!("{}", priority::remedy(&error));
+        }
         if let Some(slowed) = last.slowed() {
             tracing::warn!("{slowed}: links, searches and retractions take as much longer, and may end as not arrived");
         }
@@ -137,7 +153,7 @@ impl Arm for UrArm {
         let order = order_of(command, &self.last, &self.params)?;
         let is_stop = matches!(command, Command::Stop { .. });
         // a stop is right whenever it comes
-        if is_stop || self.freshness.may_send(self.last.stamp_s, self.client.newest_s())? {
+        if is_stop || self.freshness.may_send(self.last.stamp_s, self.client.newest())? {
             self.client.order(order)?;
         }
         Ok(())

@@ -11,7 +11,9 @@ use std::time::Duration;
 use super::dashboard::Dashboard;
 use super::error::UrError;
 use super::guard::{ClientLoss, FAREWELL, Guard, GuardState, Halt, SharedGuard, ZEROING};
+use super::lateness::StartLateness;
 use super::params::UrParams;
+use super::priority;
 use super::protocol::{Action, Begin, ClientReport, Order, UrState, vector_of};
 use crate::clock::Clock;
 use crate::probing::arm::ArmError;
@@ -59,6 +61,8 @@ impl Client {
         let sent = line_of(&begin).and_then(|line| orders.write_all(&line));
         let (sender, reports) = channel();
         thread::spawn(move || {
+            // who commands the arm says where that is refused
+            let _ = priority::raise(priority::GUARD, false);
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
                 let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
                     tracing::warn!(line, "the program that speaks to the arm said what is no report");
@@ -117,9 +121,15 @@ impl Client {
         known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
     }
 
-    /// Stamp of the newest state that has come, also where it was not given yet, s.
-    pub fn newest_s(&self) -> f64 {
-        self.shared.known().newest_s
+    /// Stamp of the newest state that has come, also where it was not given yet, and how late that came, s.
+    pub fn newest(&self) -> (f64, f64) {
+        let known = self.shared.known();
+        (known.newest_s, known.lateness.newest_s())
+    }
+
+    /// How late the states of the first second came; `None`: it is not over.
+    pub fn late_at_start(&self) -> Option<StartLateness> {
+        self.shared.known().lateness.at_start()
     }
 
     /// Throws away the states that wait.

@@ -51,6 +51,20 @@ pub enum UrError {
         /// needed
         needed_hz: f64,
     },
+    /// They come too late: something else keeps this machine or the network busy.
+    #[error(
+        "before any motion the states of the controller at {host} came up to {worst_ms:.1} ms late, one in a hundred by more than \
+         {usual_ms:.1} ms, where 20 and 4 ms are tolerable: end what else runs on this machine, allow real-time priority (docs/ur.md), \
+         or use a cable"
+    )]
+    Busy {
+        /// of the controller
+        host: String,
+        /// 99 of 100 were not later, ms
+        usual_ms: f64,
+        /// the latest, ms
+        worst_ms: f64,
+    },
     /// Somebody else has the say.
     #[error("the controller at {host} is in local control: set it to remote control at its panel")]
     Local {

@@ -20,12 +20,12 @@ pub(super) struct Freshness {
 impl Freshness {
     /// Whether an order may go out.
     ///
-    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come, s.
+    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come, s; `late_s`: how late that came, s.
     ///
     /// # Errors
     /// [`ArmError::Behind`] for a caller that does not catch up.
-    pub fn may_send(&mut self, followed_s: f64, newest_s: f64) -> Result<bool, ArmError> {
-        let age = newest_s - followed_s;
+    pub fn may_send(&mut self, followed_s: f64, (newest_s, late_s): (f64, f64)) -> Result<bool, ArmError> {
+        let age = newest_s - followed_s + late_s;
         if age.is_nan() || age <= OLD {
             self.behind_since_s = None;
             return Ok(true);
@@ -52,7 +52,7 @@ mod tests {
             let newest_s = (now_us / 2000) as f64 * 2e-3;
             // with none that waits it waits for the next
             followed_s = f64::min(followed_s + 2e-3, newest_s.max(followed_s));
-            match freshness.may_send(followed_s, newest_s) {
+            match freshness.may_send(followed_s, (newest_s, 0.0)) {
                 Ok(went) => orders.push((now_us as f64 * 1e-3, went)),
                 Err(error) => return (orders, Some(error)),
             }
@@ -88,9 +88,19 @@ mod tests {
     }
 
     #[test]
+    fn an_order_by_the_newest_state_is_not_sent_where_that_came_late() {
+        let mut freshness = Freshness::default();
+        assert_eq!(freshness.may_send(3.0, (3.0, 4e-3)), Ok(true));
+        assert_eq!(freshness.may_send(3.0, (3.0, 40e-3)), Ok(false));
+        assert_eq!(freshness.may_send(3.1, (3.1, 40e-3)), Ok(false));
+        let behind = freshness.may_send(3.25, (3.25, 40e-3));
+        assert!(matches!(behind, Err(ArmError::Behind { age_ms }) if (age_ms - 40.0).abs() < 1e-6), "{behind:?}");
+    }
+
+    #[test]
     fn a_stamp_that_goes_back_holds_nothing_back() {
         let mut freshness = Freshness::default();
-        assert_eq!(freshness.may_send(10.0, 3.0), Ok(true));
-        assert_eq!(freshness.may_send(f64::NAN, 3.0), Ok(true));
+        assert_eq!(freshness.may_send(10.0, (3.0, 0.0)), Ok(true));
+        assert_eq!(freshness.may_send(f64::NAN, (3.0, 0.0)), Ok(true));
     }
 }

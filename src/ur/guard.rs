@@ -12,8 +12,10 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::dashboard::Dashboard;
+use super::lateness::Lateness;
 use super::obedience::Obedience;
 use super::params::Deadlines;
+use super::priority;
 use super::protocol::{Action, ClientReport, Link, ProgramState, UrState};
 use crate::clock::{Clock, ManualClock};
 use crate::probing::arm::{ArmError, Safety};
@@ -66,6 +68,7 @@ pub(super) struct GuardState {
     /// whether a state has said since it was ready that something stops the arm or its program
     has_halted: bool,
     obedience: Obedience,
+    pub lateness: Lateness,
     pub broken: Option<ClientLoss>,
     /// since when it is asked to end
     closing_since: Option<Instant>,
@@ -172,6 +175,7 @@ impl GuardState {
             was_paused: false,
             has_halted: false,
             obedience: Obedience::new(now),
+            lateness: Lateness::new(now),
             broken: None,
             closing_since: None,
         }
@@ -239,10 +243,11 @@ impl GuardState {
                 (self.is_ready, self.fresh_at) = (true, Some(now));
                 // those of before have the pose of another tool
                 self.states.clear();
-                self.obedience = Obedience::new(now);
+                (self.obedience, self.lateness) = (Obedience::new(now), Lateness::new(now));
             }
             ClientReport::State(state) => {
                 (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
+                self.lateness.take(state.stamp_s, now);
                 // where the safety system has ended it, the state says so by itself
                 let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
                 self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
@@ -309,6 +314,8 @@ pub(super) struct Guard {
 impl Guard {
     /// Until the client ends; returns how the arm was stopped when that was not wanted.
     pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
+        // who starts the client says where that is refused
+        let _ = priority::raise(priority::GUARD, false);
         let clock = self.shared.clock.clone();
         let mut stamp_s = f64::INFINITY;
         let broken = loop {

@@ -23,6 +23,8 @@ const STEP: f64 = PERIOD / STEPS as f64;
 const TURN_ACCELERATION: f64 = 10.0;
 /// With which it stops when it has to, m/s².
 pub const HARD_STOP: f64 = 8.0;
+/// A part that rises does so with this speed, m/s: one that jumped over the ball would hold it inside.
+const RISING: f64 = 30e-3;
 /// States that a spike lasts.
 const SPIKE: u32 = 3;
 
@@ -71,8 +73,9 @@ pub struct Body<'a> {
     waiting: VecDeque<(f64, Motion, Option<Force>)>,
     motion: Motion,
     force: Option<Force>,
-    /// of the part, upwards in O, m
+    /// of the part, upwards in O, m; and where it is on its way to
     raised: f64,
+    raised_to: f64,
     /// of the panel: each velocity of a program is scaled by it, 0 to 1
     pub slider: f64,
     /// of the sensor along z of the flange, N/s
@@ -109,6 +112,7 @@ impl<'a> Body<'a> {
             motion: Motion::rest(HARD_STOP),
             force: None,
             raised: 0.0,
+            raised_to: 0.0,
             slider: 1.0,
             drift: 0.0,
             drifted: 0.0,
@@ -136,9 +140,14 @@ impl<'a> Body<'a> {
         (self.spike, self.spike_force) = (SPIKE, force);
     }
 
-    /// The part is higher by this from now on, m.
+    /// The sensor drifts no more, and what it has drifted is gone.
+    pub fn settle(&mut self) {
+        (self.drift, self.drifted) = (0.0, 0.0);
+    }
+
+    /// The part rises by this, m.
     pub fn raise(&mut self, by: f64) {
-        self.raised += by;
+        self.raised_to += by;
     }
 
     pub fn zero_sensor(&mut self) {
@@ -173,6 +182,7 @@ impl<'a> Body<'a> {
     fn step(&mut self) {
         self.time += STEP;
         self.drifted += self.drift * STEP;
+        self.raised += (self.raised_to - self.raised).clamp(-RISING * STEP, RISING * STEP);
         while let Some(&(at, motion, force)) = self.waiting.front()
             && at <= self.time
         {

@@ -56,6 +56,8 @@ pub fn happen(controller: &mut Controller, line: &str) {
         ["run", ms] => controller.grant(number(ms) * 1e-3),
         ["spike", force] => controller.body.hit(number(force)),
         ["drift", per_s] => controller.body.drift = number(per_s),
+        // warm, and zeroed in free air
+        ["steady"] => controller.body.settle(),
         ["noise", force] => controller.body.more_noise = number(force),
         ["payload", kg] => {
             let set = controller.body.configured_payload;

@@ -235,6 +235,8 @@ impl<'a, C: Control> Driver<'a, C> {
         let state = self.seen();
         // a program that is paused hears nothing; the arm is braked as soon as it is resumed
         if state.is_some_and(|state| !state.is_playing()) {
+            // where it is resumed its first states are those of an arm that does not move yet
+            self.doing = Doing::Braking { deceleration, since: self.clock.now() };
             return Ok(());
         }
         self.end_press()?;

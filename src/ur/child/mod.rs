@@ -22,6 +22,7 @@ pub use self::error::ChildError;
 use self::error::failure;
 use self::library::{Receive, RtdeControl, leave};
 use self::shared::{ChildShared, lines_to};
+use super::priority;
 use super::protocol::{Begin, ClientReport, Order};
 use crate::clock::Clock;
 
@@ -30,6 +31,8 @@ use crate::clock::Clock;
 /// # Errors
 /// [`ChildError`], when it cannot begin. Later errors go out as reports.
 pub fn run() -> Result<(), ChildError> {
+    // for all threads, those of the library too; who started this process says where it is refused
+    let _ = priority::raise(priority::CLIENT, true);
     let mut lines = BufReader::new(stdin()).lines().map_while(Result::ok);
     let first = lines.next().unwrap_or_default();
     let begin: Begin = serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;

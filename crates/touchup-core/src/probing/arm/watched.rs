@@ -355,7 +355,8 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// As [`Self::line`], from where the tip may be in contact: once it is free, what it meets is an obstacle.
+    /// As [`Self::line`], from where the tip may be in contact, also with more than the limit: once it is free, what it meets is an
+    /// obstacle, and before that whatever presses more than at the beginning.
     ///
     /// A surface beside the way, as the wall of a hole that it goes up in, is none: the tip goes off it and on beside the way, and ends as far
     /// beside `to`.
@@ -369,14 +370,17 @@ impl<'a> Watched<'a> {
         speed: f64,
         params: &TouchParams,
     ) -> Result<(), ProbeError> {
-        let (mut is_free, most, mut to) = (false, self.limits.force, *to);
-        let mut grazes = 0;
+        let (mut is_free, limit, mut to) = (false, self.limits.force, *to);
+        let (mut most, mut grazes) = (None, 0);
         loop {
+            self.comes_free = true;
             let met = self.go(doing, &to, speed, params, &mut |force| {
+                let most = *most.get_or_insert(limit.max(force + WORSE_N));
                 is_free |= force < params.trigger;
-                if is_free { (UNEXPECTED * params.trigger).min(most) } else { most }
-            })?;
-            let Some(met) = met else { return Ok(()) };
+                if is_free { (UNEXPECTED * params.trigger).min(limit) } else { most }
+            });
+            self.comes_free = false;
+            let Some(met) = met? else { return Ok(()) };
             grazes += 1;
             let Some(aside) = met.aside.filter(|_| grazes <= GRAZES) else { return Err(met.obstacle(doing)) };
             to.translation.vector += aside;

@@ -469,8 +469,10 @@ impl Arm for ScriptedArm<'_, '_> {
             return Err(ArmError::Stopped { safety });
         }
         let order = order_of(command, &self.last, &self.params)?;
-        let newest_s = self.world.guard.borrow().newest_s;
-        if is_stop || self.freshness.may_send(self.last.stamp_s, newest_s)? {
+        let guard = self.world.guard.borrow();
+        let newest = (guard.newest_s, guard.lateness.newest_s());
+        drop(guard);
+        if is_stop || self.freshness.may_send(self.last.stamp_s, newest)? {
             self.broken()?;
             self.send(order);
         }

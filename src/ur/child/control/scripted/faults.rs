@@ -118,7 +118,7 @@ pub const KINDS: &[Kind] = &[
         line: "late states 40",
         ends: "mend",
         stands: None,
-        reasons: &["states came", "has come", "N at (", "N over"],
+        reasons: &["states came", "has come", "N at (", "N over", "ms behind"],
     },
     Kind { line: "late orders 40", ends: "mend", stands: None, reasons: &["are ordered", "N at (", "N over"] },
     Kind { line: "spike 40", ends: "", stands: None, reasons: &["over the limit", "N at ("] },
@@ -133,8 +133,8 @@ pub const KINDS: &[Kind] = &[
     Kind { line: "noise 0.3", ends: "noise 0", stands: None, reasons: &["N at ("] },
     Kind { line: "payload 1.5", ends: "", stands: None, reasons: &["N at (", "N at rest", "over the limit"] },
     Kind { line: "rate 125", ends: "rate 500", stands: None, reasons: &["states came"] },
-    Kind { line: "drift 1", ends: "drift 0", stands: None, reasons: &["N at (", "N at rest", "N over", "changes"] },
-    Kind { line: "hold 300", ends: "", stands: None, reasons: &["states came"] },
+    Kind { line: "drift 1", ends: "steady", stands: None, reasons: &["N at (", "N at rest", "N over", "pulls with"] },
+    Kind { line: "hold 300", ends: "", stands: None, reasons: &["states came", "ms behind"] },
     Kind { line: "watchdog counts", ends: "", stands: None, reasons: &[] },
     Kind { line: "mute", ends: "mend", stands: None, reasons: &[] },
 ];
@@ -279,6 +279,16 @@ fn each_fault_alone_ends_as_it_should() {
         std::fs::write(std::path::Path::new(&folder).join("Faults_of_the_arm.md"), &table).unwrap();
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Searching at 5.3 mm/s; its program is paused, nobody ends it, and somebody resumes it.
+#[test]
+fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() {
+    let lines = [(1.91, "mute"), (1.989, "pause"), (2.211, "resume"), (2.224, "mend")];
+    let outcome = played(lines.map(|(at, line)| (at, line.to_owned())).to_vec(), 1, 6.0);
+    let (way, until) = outcome.after_report(0.1);
+    println!("{:.3} mm after it was resumed, until {:.0} ms after the report", way * 1e3, until * 1e3);
+    assert!(way < RESUMED_WAY && matches!(outcome.recovered, Some((_, Ok(Some(_))))), "{way} m");
 }
 
 /// Held up for 300 ms in its fastest link: 20 ms until the client brakes, and as many to see that it looks, to order and to brake.

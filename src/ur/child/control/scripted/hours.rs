@@ -27,13 +27,17 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     let mut session = ProbingSession::new(&world, ScriptedArm::connect(&world, &library).unwrap());
     let (mut faults, mut reported, mut recoveries, mut peak) = (0, 0, 0, 0.0_f64);
     let (mut first, mut last) = (0, 0);
+    let mut recent = Vec::new();
     while world.now() < end {
         if world.script.borrow().is_empty() {
             let from = world.now() + 0.5;
             let next = random_faults(&mut rng, from, from + 15.0);
             faults += next.len();
+            recent = script_of(&next);
             world.script.borrow_mut().extend(script_of(&next));
         }
+        // one that nobody noticed would be in this zero, and the force off by its weight after the next recovery
+        world.script.borrow_mut().push_front((world.now(), "payload 0.25".to_owned()));
         let until = world.now() + rng.random_range(5.0..20.0);
         if let Err(error) = session.probe(until) {
             reported += 1;
@@ -47,7 +51,7 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             let way: f64 = world.record.borrow().iter().filter(moved).map(|m| m.speed * STEP.as_secs_f64()).sum();
             assert!(way == 0.0, "at {at:.1} s it still moves, {:.3} mm, after: {error}", way * 1e3);
             session.arm.recover().unwrap_or_else(|why| panic!("at {at:.1} s, after `{error}`: {why}"));
-            let found = session.go_on().unwrap_or_else(|why| panic!("at {at:.1} s, after `{error}`: {why}"));
+            let found = session.go_on().unwrap_or_else(|why| panic!("{recent:?}, at {at:.1} s, `{error}`: {why}"));
             assert!(found.is_some_and(|off| off.abs() < 0.1e-3), "at {at:.1} s, after `{error}`: {found:?}");
             recoveries += 1;
         }
