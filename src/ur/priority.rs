@@ -69,7 +69,6 @@ mod tests {
                 Err(error) => {
                     assert_eq!(error.raw_os_error(), Some(libc::EPERM), "{error}");
                     assert_eq!((own, started), (ordinary, ordinary));
-                    println!("SKIPPED: what a thread with real-time priority hands on: {error}");
                 }
             }
         }
