@@ -8,4 +8,5 @@ pub use by_features::{
     Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, OrientedSample, Surfaces, align_features,
 };
 pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};
+pub(crate) use pairs::closest_motion;
 pub use pairs::{PairSide, PairsError, PairsFit, PairsParams, PointPair, fit_pairs};

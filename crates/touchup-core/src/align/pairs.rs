@@ -14,7 +14,7 @@ mod solved;
 use std::ops::RangeInclusive;
 
 pub use error::{PairSide, PairsError};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 pub use solved::{PairsFit, PairsParams, PointPair};
 
 use self::solved::SolvedMotion;
@@ -59,6 +59,12 @@ pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, 
     let fit = solved.fit(pairs, &weights, given_sigma(pairs, params));
     check_lines(pairs, fit.sigma)?;
     Ok(fit)
+}
+
+/// The motion of least squares between pairs that are known to belong together, all of the same weight; where they lie on one line, one of
+/// the motions that fit equally well. `None` for no pairs, or where one is no number.
+pub(crate) fn closest_motion(pairs: &[PointPair]) -> Option<Isometry3<f64>> {
+    SolvedMotion::of(pairs, &vec![1.0; pairs.len()], None).map(|solved| solved.motion)
 }
 
 /// σ of a pair of unit weight, where it is known beforehand.

@@ -3,6 +3,8 @@
 //!
 //! [`fit_tip_by_plane`] finds that centre from touches of a plane with a probe that leans: for an arm, which holds no ball in a cone.
 //!
+//! [`check_workspace`] finds repeatability, tip radius and growth of the error of an arm from touches of spheres.
+//!
 //! [`DwellFinder`] finds points that were picked with the stylus.
 //!
 //! [`fit_payload`] and [`fit_tip`] are one robust least squares: zᵢ = Aᵢ x + y with a vector x seen in turned axes and a constant y.
@@ -10,13 +12,17 @@
 mod dwell;
 mod fit;
 mod payload;
+mod sphere;
 mod static_segments;
 mod tip;
 mod tip_by_plane;
+mod workspace;
 
 pub use dwell::{Dwell, DwellFinder, DwellParams};
 pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
+pub use sphere::{ReferenceSphere, SphereFit, fit_sphere};
 pub(crate) use static_segments::SampleBlock;
 pub use static_segments::{StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};
 pub use tip_by_plane::{PlaneTipError, PlaneTipFit, fit_tip_by_plane};
+pub use workspace::{CheckedPlace, SphereReading, WorkspaceCheck, WorkspaceError, check_workspace};
