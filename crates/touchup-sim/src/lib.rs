@@ -28,6 +28,7 @@ mod surface;
 mod tip;
 mod triangulate;
 pub mod wavy;
+mod with_spheres;
 
 pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
 pub use arm_errors::{ArmErrorSigmas, ArmErrors};
@@ -42,3 +43,4 @@ pub use scanner::{ScanQuality, ScannerParams, measure_quality, scan};
 pub use sensor::{Moment, SensorParams};
 pub use stylus::{StylusParams, Touch, touch};
 pub use surface::{Bounds, Surface, SurfacePoint};
+pub use with_spheres::WithSpheres;

@@ -100,7 +100,8 @@ impl ReferenceSphere {
         let rings = SEGMENTS / 2;
         let on_ring = |ring: u32| {
             (0..SEGMENTS).map(move |at| {
-                let (polar, azimuth) = (PI * f64::from(ring) / f64::from(rings), TAU * f64::from(at) / f64::from(SEGMENTS));
+                let (polar, azimuth) =
+                    (PI * f64::from(ring) / f64::from(rings), TAU * f64::from(at) / f64::from(SEGMENTS));
                 Vector3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos())
             })
         };

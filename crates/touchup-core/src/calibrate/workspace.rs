@@ -64,7 +64,9 @@ pub enum WorkspaceError {
     #[error("no sphere was touched in any orientation, so nothing is known of the arm")]
     Nothing,
     /// The touches do not lie on a sphere.
-    #[error("{touches} touches of sphere {sphere} determine no sphere: touch it at five places that lie in no plane, or more")]
+    #[error(
+        "{touches} touches of sphere {sphere} determine no sphere: touch it at five places that lie in no plane, or more"
+    )]
     NoSphere {
         /// from 1 on
         sphere: usize,

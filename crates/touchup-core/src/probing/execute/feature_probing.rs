@@ -6,7 +6,9 @@ use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
 use super::prober::{Flag, Prober};
 use super::route::ToolState;
 use super::world::{Phase, Progress, World};
-use crate::probing::arm::{OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED};
+use crate::probing::arm::{
+    ArmState, OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED,
+};
 use crate::probing::plan::{Explorer, TouchPlan, TouchResult};
 
 /// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
@@ -79,10 +81,20 @@ impl<'a> Prober<'a> {
     pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
         let state = self.in_free_air(self.params.limits.tare)?;
         let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
-        let probing = FeatureProbing {
-            flag: flag.id,
+        let probing = FeatureProbing::new(self, flag.id, rotation, &state);
+        Ok((explorer, probing))
+    }
+}
+
+impl<'p, 'a> FeatureProbing<'p, 'a> {
+    /// Nothing is touched yet.
+    ///
+    /// - `flag`: its number; `rotation`: that it is touched with, of the tip in B; `state`: of the arm, in free air.
+    pub fn new(prober: &'p mut Prober<'a>, flag: u32, rotation: UnitQuaternion<f64>, state: &ArmState) -> Self {
+        Self {
+            flag,
             rotation,
-            out: ToolState::of(self.cell, &state),
+            out: ToolState::of(prober.cell, state),
             is_out: true,
             entry: None,
             from: None,
@@ -92,9 +104,8 @@ impl<'a> Prober<'a> {
             touches: Vec::new(),
             slides: Vec::new(),
             peak_force: 0.0,
-            prober: self,
-        };
-        Ok((explorer, probing))
+            prober,
+        }
     }
 }
 

@@ -15,6 +15,7 @@ mod prober;
 mod repeat;
 mod route;
 mod sliding;
+mod sphere;
 mod tip;
 mod world;
 
@@ -26,5 +27,6 @@ pub use links::{Clearance, LinkError, Tool};
 pub use payload::{PayloadProbeError, PayloadReadings};
 pub use prober::{Flag, ProbeParams, Prober};
 pub use repeat::{Repeatability, SpotError, SpotTouch};
+pub use sphere::{SphereOrientation, SphereTouches};
 pub use tip::TipPoses;
 pub use world::{Phase, Progress, StaticWorld, World};

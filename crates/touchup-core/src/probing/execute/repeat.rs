@@ -44,7 +44,7 @@ pub enum SpotError {
     #[error("{0}")]
     Ended(#[from] Ending),
     /// One of the touches made no contact, or none that can be used.
-    #[error("touch {touch} of the spot: {why}")]
+    #[error("touch {touch}: {why}")]
     NoContact {
         /// from 1 on
         touch: usize,
@@ -102,15 +102,21 @@ impl Prober<'_> {
         let (cell, world) = (probing.prober.cell, &*probing.prober.world);
         let place = on_mesh(world, spot);
         let normal = normal_about(world, &place, &cell.shaft(&probing.rotation));
-        let ended = match touch_all(&mut probing, place, normal) {
-            Err(SpotError::Ended(ending)) => Err(ending),
-            touched => Ok(touched),
-        };
-        probing.finish(ended)?
+        let touched = touch_all(&mut probing, place, normal);
+        probing.finish_spot(touched)
     }
 }
 
 impl FeatureProbing<'_, '_> {
+    /// Retracts after the touches of a spot, wherever the arm is allowed to move.
+    pub fn finish_spot<T>(&mut self, touched: Result<T, SpotError>) -> Result<T, SpotError> {
+        let ended = match touched {
+            Err(SpotError::Ended(ending)) => Err(ending),
+            touched => Ok(touched),
+        };
+        self.finish(ended)?
+    }
+
     /// One touch of a spot, and the centre of the ball then.
     ///
     /// - `touch`: its number, from 1 on.

@@ -1,0 +1,139 @@
+//! A sphere of known diameter, touched from its pole down to its upper half, with the probe upright and leaning.
+//!
+//! In each orientation of the shaft s the ball touches the sphere along −s at the pole that faces the shaft, and along six more normals 60°
+//! from s: behind the ball the shaft then leads away from the sphere, and with a lean of 25° no touch is below the equator, where its post may be.
+
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+
+use super::cone::{NotReached, Orientation, leaned, rings};
+use super::ending::Ending;
+use super::feature_probing::FeatureProbing;
+use super::prober::Prober;
+use super::repeat::SpotError;
+use crate::calibrate::ReferenceSphere;
+use crate::numeric::tangent_basis;
+use crate::probing::plan::TouchPlan;
+
+/// The touches of a sphere in one orientation of the probe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereOrientation {
+    /// of the shaft, against how it was held at first
+    pub orientation: Orientation,
+    /// centres of the ball at contact, m in O
+    pub centres: Vec<Point3<f64>>,
+}
+
+/// The touches of a sphere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereTouches {
+    /// each orientation that was reached
+    pub orientations: Vec<SphereOrientation>,
+    /// those that were left out
+    pub not_reached: Vec<NotReached>,
+}
+
+/// Leans of the shaft, °, and how many orientations around each.
+const RINGS: [(f64, usize); 2] = [(0.0, 1), (25.0, 4)];
+/// Touches around the pole, and how far from it.
+const AROUND: usize = 6;
+const POLAR: f64 = std::f64::consts::FRAC_PI_3;
+/// Four unknowns, and one touch more.
+const FEWEST: usize = 5;
+/// The ball begins to search this far from where the sphere is told to be, and searches twice as far, m.
+const STANDOFF: f64 = 3e-3;
+/// The tool comes from this far above, along the shaft, m.
+const ABOVE: f64 = 5e-3;
+
+impl Prober<'_> {
+    /// Touches a sphere in several orientations of the probe around that in which it is held; those that it does not get to are left out.
+    ///
+    /// The mesh of the world has to hold the sphere, so that no link leads through it.
+    ///
+    /// - `sphere`: where it is told to be; within 2 mm.
+    ///
+    /// # Errors
+    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
+    pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
+        let upright = self.in_free_air(self.params.limits.tare)?.pose_bt.rotation;
+        let mut touched = SphereTouches { orientations: Vec::new(), not_reached: Vec::new() };
+        let mut made = 0;
+        for orientation in rings(RINGS) {
+            match self.touch_oriented(sphere, &leaned(&upright, &orientation), &mut made)? {
+                Ok(centres) => touched.orientations.push(SphereOrientation { orientation, centres }),
+                Err(why) => touched.not_reached.push(NotReached { orientation, why }),
+            }
+        }
+        Ok(touched)
+    }
+
+    /// All touches in one orientation, or why fewer than five of them can be made.
+    ///
+    /// - `made`: number of touches of the sphere until now.
+    fn touch_oriented(
+        &mut self,
+        sphere: &ReferenceSphere,
+        rotation: &UnitQuaternion<f64>,
+        made: &mut usize,
+    ) -> Result<Result<Vec<Point3<f64>>, String>, SpotError> {
+        let planned = touches(sphere, self.params.pattern.ball_radius, &self.cell.shaft(rotation));
+        // its time is that of a feature
+        let state = self.in_free_air(self.params.limits.tare)?;
+        let mut probing = FeatureProbing::new(self, 0, *rotation, &state);
+        let (mut centres, mut left_out) = (Vec::new(), None);
+        let touched = planned.iter().try_for_each(|planned| match probing.touch_spot(planned, *made + 1) {
+            Ok((_, centre)) => {
+                *made += 1;
+                centres.push(centre);
+                Ok(())
+            }
+            Err(SpotError::Ended(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))) => {
+                left_out.get_or_insert(ending.why());
+                Ok(())
+            }
+            Err(error) => Err(error),
+        });
+        probing.finish_spot(touched)?;
+        Ok(if centres.len() >= FEWEST { Ok(centres) } else { Err(left_out.unwrap_or_default()) })
+    }
+}
+
+/// A pole and a ring around it.
+fn touches(sphere: &ReferenceSphere, ball_radius: f64, shaft: &Unit<Vector3<f64>>) -> Vec<TouchPlan> {
+    let [u, v] = tangent_basis(shaft);
+    let around = (0..AROUND).map(|at| std::f64::consts::TAU * at as f64 / AROUND as f64);
+    let ring =
+        around.map(|towards| (u * towards.cos() + v * towards.sin()) * POLAR.sin() + shaft.as_ref() * POLAR.cos());
+    let touch = |out: Vector3<f64>| {
+        let from = sphere.centre + out * (sphere.radius + ball_radius + STANDOFF);
+        let entry = from + shaft.into_inner() * ABOVE;
+        let direction = Unit::new_normalize(-out);
+        TouchPlan { entry, from, direction, search: 2.0 * STANDOFF, expected: None }
+    };
+    [shaft.into_inner()].into_iter().chain(ring).map(touch).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Neither the shaft behind the ball nor the way in comes nearer to the sphere than the ball, and none of the touches is below the equator.
+    #[test]
+    fn the_shaft_leads_away_from_the_sphere_and_its_post_is_left_alone() {
+        let (sphere, ball) = (ReferenceSphere { centre: Point3::new(0.1, 0.0, 0.05), radius: 12.5e-3 }, 1.5e-3);
+        for orientation in rings(RINGS) {
+            let shaft = Unit::new_normalize(leaned(&UnitQuaternion::identity(), &orientation) * Vector3::z());
+            let planned = touches(&sphere, ball, &shaft);
+            assert_eq!(planned.len(), 7);
+            for touch in planned {
+                let contact = sphere.centre - touch.direction.into_inner() * (sphere.radius + ball);
+                assert!(contact.z > sphere.centre.z, "{orientation:?}");
+                for up in 1..60 {
+                    let behind = contact + shaft.into_inner() * (1e-3 * f64::from(up));
+                    assert!((behind - sphere.centre).norm() > sphere.radius + ball);
+                    let above = touch.from + shaft.into_inner() * (1e-3 * f64::from(up));
+                    assert!((above - sphere.centre).norm() > (touch.from - sphere.centre).norm());
+                }
+            }
+        }
+    }
+}
