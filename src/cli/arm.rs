@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use super::CliError;
+use super::arm_errors::ArmErrorsName;
 use super::probing::{KeptMeasurements, Ready, SpotWorld, millimetres};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
+use crate::calibrate::ReferenceSphere;
 use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
@@ -15,7 +17,7 @@ use crate::probing::execute::{Cell, Prober};
 #[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::Scene;
-use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS};
+use crate::sim::{ArmParams, MeshSurface, SimArm, WEIGHTLESS, WithSpheres};
 use crate::stylus::Payload;
 #[cfg(feature = "ur")]
 use crate::ur::{UrArm, UrParams};
@@ -107,9 +109,22 @@ pub(super) struct CellArguments {
     /// The true part, for a simulated arm: a closed mesh
     #[arg(long, value_name = "MESH")]
     truth: Option<PathBuf>,
-    /// Seed of the noise of the simulated arm
+    /// Seed of the noise of the simulated arm, and of its errors
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// By what the simulated arm differs from what the scene tells of it
+    #[arg(long, value_name = "ERRORS", default_value = "none")]
+    arm_errors: ArmErrorsName,
+}
+
+/// A measurement with the probe about the scan as it is.
+pub(super) struct Measurement<'a> {
+    /// what this is called while it lasts
+    pub stage: &'static str,
+    /// what is measured, and where each of it is written as it is measured
+    pub kept: KeptMeasurements<'a>,
+    /// that stand beside the part
+    pub spheres: &'a [ReferenceSphere],
 }
 
 /// Where the touches of a measurement go.
@@ -171,28 +186,26 @@ impl CellArguments {
             RobotName::Sim => {
                 let part = self.part()?;
                 let surface = MeshSurface::new(&part)?;
-                let params = truth(ready.simulated_arm(self.seed))?;
-                work(&mut SimArm::new(&surface, params, &ready.cell.above(&part))?)
+                let all = WithSpheres { part: &surface, spheres: &ready.spheres };
+                let params = truth(ready.simulated_arm(self.seed, self.arm_errors))?;
+                work(&mut SimArm::new(&all, params, &ready.cell.above(&ready.with_spheres(&part)?))?)
             }
         }
     }
 
     /// Measures something with the probe of an arm about the scan as it is, until a signal stops it; returns also the cell.
     ///
-    /// - `stage`: what this is called while it lasts.
-    /// - `kept`: what is measured, and where each of it is written as it is measured.
     /// - `truth`: as in [`Self::with`].
     pub fn measure<T, E: Into<CliError>>(
         &self,
         robot: RobotName,
         scene: &Path,
-        stage: &'static str,
-        kept: KeptMeasurements<'_>,
+        Measurement { stage, kept, spheres }: Measurement<'_>,
         truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
     ) -> Result<(T, Cell), CliError> {
         let (scan, unit) = self.scan(scene)?;
-        let ready = Ready::read(scene, &scan, unit)?;
+        let ready = Ready::read(scene, &scan, unit)?.beside(spheres);
         ready.may_move()?;
         let _measuring = WorkProgress::stage(stage);
         let truth = |arm| truth(arm, &ready.scene);

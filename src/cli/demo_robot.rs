@@ -10,22 +10,50 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
+use super::arm_errors::ArmErrorsName;
+use super::check::{CheckReport, Gates, SPOT_TOUCHES, touched};
 use super::compare::{CompareArguments, compared};
 use super::found::kind_of;
-use super::probing::{Done, Probing, ProbingSummary};
+use super::probing::{Done, Probing, ProbingSummary, Ready};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use super::{CliError, Losses, not_written, print_result, reported, write_json};
+use crate::calibrate::ReferenceSphere;
 use crate::features::{Feature, Measured};
 use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::features_file::FeatureRecord;
 use crate::io::mesh_file::{MeshUnit, write_mesh};
 use crate::probing::arm::Arm;
-use crate::probing::execute::{Flag, Probed};
-use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, scan};
+use crate::probing::execute::{Flag, Probed, Prober};
+use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSpheres, scan};
 
-/// Its scene, written beside the other files.
+/// Its scene, written beside the other files …
 const SCENE: &str = include_str!("../../config/probe.yaml");
+/// … with what is told of an arm that differs from it by errors of `ArmErrorSigmas::CALIBRATED`, and the record of its check.
+const CALIBRATED: &str = "  # what is not known of arm and place of the part, and what its check found
+  check: check.json
+  temperature_c: 21
+  radius_sigma_mm: 0.002
+  place_sigma_mm: 0.05
+  turn_sigma_deg: 0.02
+  registered_at_mm: [30, 25, 12]
+  touch_sigma_mm: 0.03
+  tolerance_mm: 0.12
+";
+/// The line of the record in it.
+const CHECK: &str = "  check: check.json\n";
+/// What it has in the place of these, of an arm without.
+const PERFECT: &str = "  # it comes to a place with no error of its own
+  touch_sigma_mm: 0.005
+  tolerance_mm: 0.02
+";
+/// A flat spot of the plate.
+const SPOT: Point3<f64> = Point3::new(45e-3, 9e-3, 12e-3);
+/// Spheres around the plate, centres and diameter, mm.
+const SPHERES: [[f64; 3]; 4] = [[-70.0, 25.0, 20.0], [130.0, 25.0, 20.0], [30.0, -90.0, 40.0], [30.0, 150.0, 60.0]];
+const DIAMETER: f64 = 25.0;
+/// Uncertainties are printed with this coverage factor.
+const COVERAGE: f64 = 2.0;
 /// The triangles of the part are this near to it, m: what is probed on them differs from the drawing by no more than a touch does.
 const CHORD_ERROR: f64 = 0.5e-6;
 /// Largest error of a click, m.
@@ -34,6 +62,7 @@ const CLICK: f64 = 3e-3;
 /// What `summary.json` holds; lengths in mm.
 #[derive(Debug, Serialize)]
 struct RobotSummary {
+    check: CheckReport,
     probing: ProbingSummary,
     errors: Vec<ProbedError>,
 }
@@ -50,7 +79,30 @@ reported! {
         /// across the axis, of an edge across itself
         place_mm: Option<f64> = found.map(|found| place_error(found, truth) * 1e3),
         /// of the diameter, or of the width and the length
-        sizes_mm: Vec<f64> = found.map_or(Vec::new(), |found| size_errors(found, truth)),
+        sizes_mm: Vec<f64> = numbers(found, truth).iter().map(|number| number.error_mm).collect(),
+        /// the place, and the numbers of `sizes_mm`
+        numbers: Vec<NumberError> = found.map(|found| place_number(found, truth)).into_iter().chain(numbers(found, truth)).collect(),
+    }
+}
+
+/// A number beside what it truly is.
+#[derive(Debug, Serialize)]
+struct NumberError {
+    number: &'static str,
+    /// of a place, where it is off
+    #[serde(skip_serializing_if = "Option::is_none")]
+    true_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    found_mm: Option<f64>,
+    /// of a place, how far it is off
+    error_mm: f64,
+    /// twice the standard uncertainty
+    expanded_mm: f64,
+}
+
+impl NumberError {
+    fn holds(&self) -> bool {
+        self.error_mm.abs() <= self.expanded_mm
     }
 }
 
@@ -67,7 +119,12 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
         write_mesh(path, mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
     }
-    write_atomically(&scene_path, |file| file.write_all(SCENE.as_bytes())).map_err(not_written(&scene_path))?;
+    let scene = SCENE.replace(PERFECT, CALIBRATED);
+    let write_scene = |text: &str| {
+        write_atomically(&scene_path, |file| file.write_all(text.as_bytes())).map_err(not_written(&scene_path))
+    };
+    // the record of another run says nothing of this arm
+    write_scene(&scene.replace(CHECK, ""))?;
 
     let features = plate.features();
     let mut rng = Pcg64::seed_from_u64(seed);
@@ -80,9 +137,17 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         is_simulated: true,
         out,
     };
+    let spheres = SPHERES
+        .map(|centre| ReferenceSphere { centre: Point3::from(Vector3::from(centre) / 1e3), radius: DIAMETER / 2e3 });
+    let unchecked = probing.ready()?.beside(&spheres);
+    let start = unchecked.cell.above(&unchecked.with_spheres(&truth)?);
+    let around = WithSpheres { part: &plate, spheres: &spheres };
+    let mut arm = SimArm::new(&around, unchecked.simulated_arm(seed, ArmErrorsName::Calibrated), &start)?;
+    let check = checked(&unchecked, &mut arm)?;
+    write_json(&out.join("check.json"), &check)?;
+    write_scene(&scene)?;
+
     let ready = probing.ready()?;
-    let start = ready.cell.above(&truth);
-    let mut arm = SimArm::new(&plate, ready.simulated_arm(seed), &start)?;
     let now = arm.next_state().map_err(CliError::arm)?;
     probing.planned(&ready, &now)?;
     // nothing real moves: a signal ends it as any other verb
@@ -94,13 +159,22 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
         ProbedError::of(flag, truth, probed, probed.and_then(feature_of))
     });
-    let demo = RobotSummary { probing: summary, errors: errors.collect() };
+    let demo = RobotSummary { check, probing: summary, errors: errors.collect() };
     write_json(&out.join("summary.json"), &demo)?;
     print_result(&format!(
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
         out.display()
     ));
     outcome
+}
+
+/// A spot and all spheres are touched.
+fn checked(ready: &Ready, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
+    let _checking = WorkProgress::stage("check");
+    let mut world = ready.static_world()?;
+    let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
+    let touches = touched(&mut prober, Some(&(SPOT, SPOT_TOUCHES)), &ready.spheres)?;
+    CheckReport::of(&touches, &ready.spheres, &ready.scene, None, Gates::default())
 }
 
 fn feature_of(probed: &Probed) -> Option<&Feature> {
@@ -125,42 +199,64 @@ fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
     }
 }
 
-/// Errors of the sizes against the drawing, mm.
-fn size_errors(found: &Feature, truth: &TruthFeature) -> Vec<f64> {
-    let error = |measured: &Option<Measured<f64>>, size: f64| {
-        (measured.as_ref().map_or(f64::NAN, |measured| measured.value) - size) * 1e3
+/// Where it is off, and how far it may be.
+fn place_number(found: &Feature, truth: &TruthFeature) -> NumberError {
+    let expanded_mm = COVERAGE * found.centre.std.unwrap_or(f64::NAN) * 1e3;
+    let error_mm = place_error(found, truth) * 1e3;
+    NumberError { number: "place", true_mm: None, found_mm: None, error_mm, expanded_mm }
+}
+
+/// The sizes against the drawing.
+fn numbers(found: Option<&Feature>, truth: &TruthFeature) -> Vec<NumberError> {
+    let Some(found) = found else { return Vec::new() };
+    let number = |number, measured: &Option<Measured<f64>>, size: f64| {
+        let value = measured.as_ref().map_or(f64::NAN, |measured| measured.value);
+        let std = measured.as_ref().and_then(|measured| measured.std).unwrap_or(f64::NAN);
+        let (true_mm, found_mm) = (Some(size * 1e3), Some(value * 1e3));
+        NumberError { number, true_mm, found_mm, error_mm: (value - size) * 1e3, expanded_mm: COVERAGE * std * 1e3 }
     };
     match truth.shape {
-        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => vec![error(&found.diameter, diameter)],
-        TruthShape::Slot { width, length, .. } => vec![error(&found.width, width), error(&found.length, length)],
+        TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => {
+            vec![number("diameter", &found.diameter, diameter)]
+        }
+        TruthShape::Slot { width, length, .. } => {
+            vec![number("width", &found.width, width), number("length", &found.length, length)]
+        }
         TruthShape::Step { .. } => Vec::new(),
     }
 }
 
 impl fmt::Display for RobotSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}\n", self.check)?;
         writeln!(f, "{}", self.probing)?;
-        writeln!(f, "against the drawing:")?;
+        writeln!(f, "against the drawing, ± with a coverage factor of {COVERAGE}:")?;
         writeln!(
             f,
-            "  {:<13} {:>9} {:>8} {:>6} {:>7} {:>10}  size mm",
-            "", "click mm", "touches", "s", "N", "place mm"
+            "  {:<13} {:>9} {:>8} {:>4} {:>5}  {:<9} {:>8} {:>9} {:>8} {:>8}",
+            "", "click mm", "touches", "s", "N", "number", "true mm", "found mm", "± mm", "error mm"
         )?;
+        let or_none = |mm: Option<f64>| mm.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.4}"));
         for error in &self.errors {
-            let place = error.place_mm.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.4}"));
-            let sizes: Vec<String> = error.sizes_mm.iter().map(|mm| format!("{mm:+.4}")).collect();
-            writeln!(
-                f,
-                "  {:<13} {:>9.1} {:>8} {:>6.0} {:>7.1} {:>10}  {}",
-                error.name,
-                error.click_mm,
-                error.touches,
-                error.duration_s,
-                error.largest_force_n,
-                place,
-                sizes.join(" ")
-            )?;
+            let ProbedError { name, click_mm, touches, duration_s, largest_force_n, numbers, .. } = error;
+            let mut before =
+                format!("{name:<13} {click_mm:>9.1} {touches:>8} {duration_s:>4.0} {largest_force_n:>5.1}");
+            if numbers.is_empty() {
+                writeln!(f, "  {before}  not found")?;
+            }
+            for one in numbers {
+                let NumberError { number, true_mm, found_mm, error_mm, expanded_mm } = one;
+                let beyond = if one.holds() { "" } else { "  beyond its ±" };
+                let (true_mm, found_mm) = (or_none(*true_mm), or_none(*found_mm));
+                writeln!(
+                    f,
+                    "  {before:<43}  {number:<9} {true_mm:>8} {found_mm:>9} {expanded_mm:>8.4} {error_mm:>+8.4}{beyond}"
+                )?;
+                before.clear();
+            }
         }
-        Ok(())
+        let all = || self.errors.iter().flat_map(|error| &error.numbers);
+        let held = all().filter(|number| number.holds()).count();
+        writeln!(f, "  within their ±: {held} of {}", all().count())
     }
 }

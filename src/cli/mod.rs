@@ -5,6 +5,7 @@
 //! With `--json` an error is one object on stderr.
 
 mod arm;
+mod arm_errors;
 mod calibrate;
 mod check;
 mod compare;

@@ -39,6 +39,9 @@ pub(super) struct ProbeArguments {
     /// Longest time for a feature, s: less than the scene allows
     #[arg(long, value_name = "T")]
     max_duration_s: Option<f64>,
+    /// Temperature of the cell, °C: where the arm was checked at another, that stands in the results; default: robot.temperature_c of the scene
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    temperature_c: Option<f64>,
     /// Slides over the found feature with constant force, so that the mesh follows: along walls and across rims
     #[arg(long)]
     slide: bool,
@@ -93,6 +96,9 @@ impl ProbeArguments {
 
     /// A request can ask for less than the scene allows.
     fn narrow(&self, ready: &mut Ready) -> Result<(), CliError> {
+        if let Some(temperature_c) = self.temperature_c {
+            ready.at_temperature(temperature_c)?;
+        }
         let by = Narrower { force: self.max_force_n, time: self.max_duration_s, ..Narrower::default() };
         let wanted_mm = ready.tolerance_mm();
         ready.params = ready.params.narrowed(&by).map_err(CliError::usage)?;

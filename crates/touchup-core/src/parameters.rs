@@ -99,6 +99,8 @@ units! {
     KG "kg";
     HZ "Hz";
     S "s";
+    DAYS "days";
+    CELSIUS "°C";
     PER_S "1/s";
     M_PER_S2 "m/s²";
     M_PER_N_S "m/(N·s)";

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use tracing::warn;
 
-use super::super::arm::{CellArguments, RobotName, TruePayload};
+use super::super::arm::{CellArguments, Measurement, RobotName, TruePayload};
 use super::super::probing::KeptMeasurements;
 use super::super::{CliError, Losses, reported, require};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, DraftScene, Vector, rounded};
@@ -92,8 +92,8 @@ fn payload_of_arm(arguments: &PayloadArguments, robot: RobotName, gravity: f64) 
     let kept = KeptMeasurements::Segments(segments_out.as_deref());
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
-    let stage = "identify the payload";
-    let (readings, _) = cell.measure(robot, scene, stage, kept, truth, |prober| prober.measure_payload())?;
+    let measurement = Measurement { stage: "identify the payload", kept, spheres: &[] };
+    let (readings, _) = cell.measure(robot, scene, measurement, truth, |prober| prober.measure_payload())?;
     let PayloadReadings { segments, not_reached } = readings;
     let params = PayloadParams { gravity, ..PayloadParams::default() };
     let fit = fit_payload(&segments, &params).map_err(|error| CliError::arm(advice(&error)))?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::{Point3, Vector3};
 
-use super::super::arm::{CellArguments, RobotName, TouchesOutput};
+use super::super::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
 use super::super::probing::{KeptMeasurements, millimetres};
 use super::super::{CliError, Losses, reported};
 use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
@@ -89,7 +89,8 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
 /// - `spot`: as it was written, X,Y,Z in mm.
 fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
     let TipArguments { cell, truth_tip_mm, output, target, .. } = arguments;
-    let out = KeptMeasurements::Touches(output.touches_out.as_deref());
+    let kept = KeptMeasurements::Touches(output.touches_out.as_deref());
+    let measurement = Measurement { stage: "touch", kept, spheres: &[] };
     let place = Point3::from(millimetres("--spot", spot)?);
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, _: &Scene| {
@@ -97,7 +98,7 @@ fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
-    let (measured, of_arm) = cell.measure(robot, scene, "touch", out, truth, |prober| prober.measure_tip(&place))?;
+    let (measured, of_arm) = cell.measure(robot, scene, measurement, truth, |prober| prober.measure_tip(&place))?;
     let TipPoses { poses_bf, normal_b, not_reached } = measured;
     let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
     target.write(&draft, &PivotFound::of(&fit, &of_arm, &not_reached))?;

@@ -1,6 +1,5 @@
 //! The folder of a probing: what was asked for, and which features are finished.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -8,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::files::{RECORDING, TOUCHES};
 use super::ready::Ready;
-use super::report::{ProbedRecord, kind_of};
+use super::report::{ProbedFile, ProbedRecord, kind_of};
 use crate::cli::{CliError, require, write_json};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::probed_touches_file::{TouchLine, read_probed_touches};
@@ -48,6 +47,11 @@ struct ProbingSettings {
     largest_force_n: f64,
     longest_s: f64,
     slides: bool,
+    /// of a check of the arm, or as the scene tells
+    #[serde(default)]
+    touch_sigma_mm: f64,
+    #[serde(default)]
+    growth_mm_per_m: f64,
 }
 
 impl ProbingRequest {
@@ -74,6 +78,8 @@ impl ProbingRequest {
             largest_force_n: params.limits.force,
             longest_s: params.limits.time,
             slides: params.slides,
+            touch_sigma_mm: params.pattern.touch_sigma * 1e3,
+            growth_mm_per_m: params.pattern.shared.growth * 1e3,
         };
         let flags = flags.iter().map(flag_record).collect();
         Ok(Self { scene, scene_crc32, scan, scan_crc32, mesh_unit, is_simulated, flags, settings })
@@ -86,7 +92,7 @@ impl ProbingRequest {
             (self.scene_crc32 != before.scene_crc32, "the scene"),
             ((self.scan_crc32, self.mesh_unit) != (before.scan_crc32, before.mesh_unit), "the scan or its unit"),
             (self.flags != before.flags, "the list of features"),
-            (self.settings != before.settings, "tolerance, touches, force, time or slides"),
+            (self.settings != before.settings, "tolerance, touches, force, time, slides or the check of the arm"),
         ];
         differences.into_iter().find_map(|(differs, what)| differs.then_some(what))
     }
@@ -106,7 +112,7 @@ impl ProbingFolder<'_> {
     /// Begins a probing in the place of an older one.
     pub fn begin(self, request: &ProbingRequest) -> Result<(), CliError> {
         write_json(&self.path.join(REQUEST), request)?;
-        self.write(&[])
+        self.write(&ProbedFile::default())
     }
 
     /// Refuses to write over a recording that no probing made, as that of a session.
@@ -154,8 +160,8 @@ impl ProbingFolder<'_> {
     }
 
     /// Writes the features that were probed so far.
-    pub fn write(self, records: &[ProbedRecord]) -> Result<(), CliError> {
-        write_json(&self.path.join(RECORDS), &BTreeMap::from([("features", records)]))
+    pub fn write(self, records: &ProbedFile) -> Result<(), CliError> {
+        write_json(&self.path.join(RECORDS), records)
     }
 
     /// All touches.
@@ -165,8 +171,7 @@ impl ProbingFolder<'_> {
     }
 
     fn records(self) -> Result<Vec<ProbedRecord>, CliError> {
-        let records = self.read::<BTreeMap<String, Vec<ProbedRecord>>>(RECORDS)?;
-        Ok(records.and_then(|mut records| records.remove("features")).unwrap_or_default())
+        Ok(self.read::<ProbedFile>(RECORDS)?.unwrap_or_default().features)
     }
 
     /// A file; `None` where it is not there.

@@ -25,9 +25,9 @@ use crate::probing::execute::{Ending, Flag, Plan, Probed, Prober, plan};
 use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};
 use picture::{draw_plan, draw_touches};
-pub(super) use ready::Ready;
-use report::ProbedRecord;
+pub(super) use ready::{Ready, check_temperature};
 pub(super) use report::ProbingSummary;
+use report::{CheckOfResults, ProbedFile, ProbedRecord};
 use world::LiveWorld;
 pub(super) use world::{KeptMeasurements, SpotWorld};
 
@@ -65,7 +65,7 @@ impl Probing<'_> {
     /// - `now`: of the arm.
     pub fn planned(&self, ready: &Ready, now: &ArmState) -> Result<Vec<Plan>, CliError> {
         let _planning = WorkProgress::stage("plan");
-        let world = ready.static_world();
+        let world = ready.static_world()?;
         let plan_of = |flag: &Flag| {
             plan(&ready.cell, &ready.params, &world, flag, now).map_err(|error| CliError::plan(flag.id, error))
         };
@@ -101,6 +101,7 @@ impl Probing<'_> {
             folder.begin(&request)?;
         }
         let mut probed: Vec<Probed> = Vec::new();
+        let check = CheckOfResults::of(&ready.check);
         for flag in self.flags {
             if features.iter().any(|record| record.flag == flag.id) {
                 continue;
@@ -108,7 +109,10 @@ impl Probing<'_> {
             let one = Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag);
             features.push(ProbedRecord::of(&one, flag));
             features.sort_by_key(|record| record.flag);
-            folder.write(&features)?;
+            // kept as it is, whatever comes after it
+            let file = ProbedFile { features, check: Some(check.clone()) };
+            folder.write(&file)?;
+            features = file.features;
             let is_over = matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled(_));
             probed.push(one);
             if is_over {
@@ -125,7 +129,7 @@ impl Probing<'_> {
                 self.flags.len(),
                 self.out.join(TOUCHES).display()
             ));
-            return Ok(Done { summary: ProbingSummary { features, refine: None }, probed, outcome: Err(error) });
+            return Ok(Done { summary: ProbingSummary { check, features, refine: None }, probed, outcome: Err(error) });
         }
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let bag = self.out.join(RECORDING);
@@ -142,12 +146,12 @@ impl Probing<'_> {
         };
         let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
         draw_touches(&mesh, &folder.touches()?, &probed, self.flags, &self.out.join("touches.png"))?;
-        Ok(Done { summary: ProbingSummary { features, refine: Some(refine) }, probed, outcome })
+        Ok(Done { summary: ProbingSummary { check, features, refine: Some(refine) }, probed, outcome })
     }
 }
 
 /// Numbers that were written A,B,C in mm, m; `None` where one is no number.
-fn metres(text: &str) -> Option<Vec<f64>> {
+pub(super) fn metres(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|mm| mm.parse::<f64>().ok().filter(|mm| mm.is_finite()).map(|mm| mm / 1e3)).collect()
 }
 

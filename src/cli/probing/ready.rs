@@ -1,16 +1,30 @@
 //! Scene and scan of an arm, read and checked before anything moves.
 
 use std::path::Path;
+use std::time::SystemTime;
 
 use nalgebra::{Isometry3, Point3};
 use tracing::info;
 
+use crate::calibrate::{ReferenceSphere, beside_spheres};
+use crate::cli::arm_errors::ArmErrorsName;
 use crate::cli::{CliError, require};
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::execute::{Cell, ProbeParams, StaticWorld};
-use crate::scene::{Scene, simulated_arm};
+use crate::scene::{CheckStanding, Scene, simulated_arm};
 use crate::sim::ArmParams;
+
+/// How far the check of the arm can be relied on now; `None` without `robot`.
+fn standing(scene: &Scene) -> Option<CheckStanding> {
+    scene.robot.as_ref().map(|robot| robot.check_standing(SystemTime::now()))
+}
+
+/// Refuses a value of `--temperature-c` that no cell has.
+pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliError> {
+    let is_allowed = (-50.0..=100.0).contains(&temperature_c);
+    require(is_allowed, format_args!("--temperature-c {temperature_c} must be -50 to 100"))
+}
 
 /// A prepared probing.
 pub(in crate::cli) struct Ready {
@@ -18,6 +32,10 @@ pub(in crate::cli) struct Ready {
     pub params: ProbeParams,
     pub scene: Scene,
     pub(super) mesh: TriMesh,
+    /// beside the part
+    pub spheres: Vec<ReferenceSphere>,
+    /// how far the check of the arm can be relied on now
+    pub check: CheckStanding,
 }
 
 const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's base and its allowed volume are unknown: add \
@@ -33,12 +51,35 @@ impl Ready {
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
         let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
         info!(%repair, "scan");
-        Ok(Self { cell, params, scene, mesh })
+        let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
+        Ok(Self { cell, params, scene, mesh, spheres: Vec::new(), check })
+    }
+
+    /// The same with spheres beside the part.
+    pub fn beside(self, spheres: &[ReferenceSphere]) -> Self {
+        Self { spheres: spheres.to_vec(), ..self }
+    }
+
+    /// The cell has this temperature, °C.
+    ///
+    /// # Errors
+    /// [`CliError::usage`] for none that a cell can have.
+    pub fn at_temperature(&mut self, temperature_c: f64) -> Result<(), CliError> {
+        check_temperature(temperature_c)?;
+        self.scene.robot.iter_mut().for_each(|robot| robot.temperature_c = Some(temperature_c));
+        self.check = standing(&self.scene).unwrap_or_else(|| self.check.clone());
+        Ok(())
     }
 
     /// A simulated arm of this cell.
-    pub fn simulated_arm(&self, seed: u64) -> ArmParams {
-        ArmParams { seed, ..simulated_arm(&self.cell, &self.params) }
+    pub fn simulated_arm(&self, seed: u64, errors: ArmErrorsName) -> ArmParams {
+        let errors = errors.drawn(self.params.pattern.shared.registered_at.into(), seed);
+        ArmParams { seed, errors, ..simulated_arm(&self.cell, &self.params) }
+    }
+
+    /// A mesh of the part, and the spheres beside it.
+    pub fn with_spheres(&self, part: &TriMesh) -> Result<TriMesh, CliError> {
+        Ok(beside_spheres(part, &self.spheres)?)
     }
 
     /// Where a plan without an arm begins: the pose of the tip in B, and the centre of the ball in O.
@@ -52,9 +93,9 @@ impl Ready {
         }
     }
 
-    /// The scan, unchanged during probing.
-    pub fn static_world(&self) -> StaticWorld {
-        StaticWorld::new(self.mesh.clone())
+    /// The scan and the spheres beside it, unchanged during probing.
+    pub fn static_world(&self) -> Result<StaticWorld, CliError> {
+        Ok(StaticWorld::new(self.with_spheres(&self.mesh)?))
     }
 
     /// Target half width of the scene, mm.

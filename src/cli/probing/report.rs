@@ -11,6 +11,7 @@ use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::probing::arm::SlideRecord;
 use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch};
+use crate::scene::{CheckRecord, CheckStanding};
 
 reported! {
     /// One flag: of `probed.json`.
@@ -124,9 +125,35 @@ reported! {
     }
 }
 
+reported! {
+    /// The check of the arm, as it stands at the time of the results.
+    #[derive(Clone, Deserialize)]
+    pub(in crate::cli) struct CheckOfResults, pub(super) fn of(standing: &CheckStanding) {
+        /// whether nothing casts doubt on it
+        is_good: bool = standing.doubts.is_empty(),
+        /// why it cannot be relied on
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        doubts: Vec<String> = standing.doubts(),
+        age_days?: f64 = standing.age_days,
+        /// what was checked, without the touches
+        record?: CheckRecord = standing.record.clone(),
+        /// in one line
+        summary: String = standing.to_string(),
+    }
+}
+
+/// What `probed.json` holds.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct ProbedFile {
+    pub features: Vec<ProbedRecord>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub check: Option<CheckOfResults>,
+}
+
 /// The summary of a probing.
 #[derive(Debug, Serialize)]
 pub(in crate::cli) struct ProbingSummary {
+    pub check: CheckOfResults,
     pub features: Vec<ProbedRecord>,
     /// of the mesh; not there where a signal ended the probing
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,6 +188,7 @@ impl fmt::Display for ProbingSummary {
             record.slides.iter().try_for_each(|slide| write!(f, "\n  {slide}"))?;
             writeln!(f)?;
         }
+        writeln!(f, "{}", self.check.summary)?;
         self.refine.iter().try_for_each(|refine| write!(f, "{refine}"))
     }
 }

@@ -224,7 +224,7 @@ impl<'a> SpotWorld<'a> {
     pub fn new(ready: &Ready, kept: KeptMeasurements, signals: &'a StopSignals) -> Result<Self, CliError> {
         let ball_radius = ready.params.pattern.ball_radius;
         let log = MeasurementLog::create(kept, ball_radius)?;
-        Ok(Self { scan: ready.static_world(), signals, log, made: Vec::new(), ball_radius, failed: None })
+        Ok(Self { scan: ready.static_world()?, signals, log, made: Vec::new(), ball_radius, failed: None })
     }
 
     /// What was measured; where that was broken off what was measured until then is printed, unless a file has it.

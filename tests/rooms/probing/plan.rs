@@ -411,7 +411,7 @@ fn explored(
     distance: &dyn Fn(&Point3<f64>) -> f64,
     rng: &mut Pcg64,
 ) -> Result<Found, ExploreError> {
-    let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
     let mut lean = || rng.random_range(-0.05..0.05);
     let normal = Unit::new_normalize(Vector3::new(lean(), lean(), 1.0));
     let mut explorer = Explorer::new(Some(kind), &flag, &normal, params, scan).unwrap();
@@ -494,7 +494,7 @@ fn a_slot_without_ends_is_reported_as_such() {
 #[test]
 fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(24));
-    let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
     let mut claimed = 0;
     for _ in 0..50 {
         let flag = Point3::new(16e-3 + rng.random_range(-2e-3..2e-3), 36e-3 + rng.random_range(-2e-3..2e-3), TOP);
@@ -527,7 +527,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
     let truth = Point3::new(47e-3, 25e-3, TOP);
     for missed in 0..3 {
         let flag = truth + Vector3::new(1e-3, -0.5e-3, 4e-3);
-        let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+        let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
         let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
         let mut walls = 0;
         while let Some(planned) = explorer.next_touch() {
@@ -593,7 +593,7 @@ fn no_touch_is_planned_beside_the_part() {
                 let mut rng = Pcg64::seed_from_u64(seed);
                 let (turn, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..2e-3));
                 let flag = Point3::from(flagged.map(|mm| mm * 1e-3)) + Vector3::new(turn.cos(), turn.sin(), 0.0) * off;
-                let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+                let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
                 let mut explorer = Explorer::new(kind, &flag, &Vector3::z_axis(), params, scan).unwrap();
                 while let Some(planned) = explorer.next_touch() {
                     let from = planned.from;

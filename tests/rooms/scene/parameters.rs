@@ -86,17 +86,19 @@ robot.largest_tare_n N 5 0.1 100
 robot.search_mm mm 15 0.5 100
 robot.latency_ms ms 20 0 200
 robot.time_s s 600 1 86400
+robot.check_days days 30 0.01 3650
+robot.temperature_c °C - -50 100
 robot.least_dexterity - 0.02 0 1
 robot.clearance_mm mm 3 0.5 50
 robot.depth_mm mm 5 0 100
 robot.shaft_radius_mm mm 1 0.05 50
 robot.shaft_length_mm mm 60 0 500
 robot.margin_mm mm 0.5 0 50
-robot.tolerance_mm mm 0.02 0.0001 10
+robot.tolerance_mm mm 0.05 0.0001 10
 robot.confidence - 0.95 0.5 0.9999
 robot.touches touches 39 1 10000
-robot.touch_sigma_mm mm 0.005 1e-5 1
 robot.square_sigma_deg degrees 0.13 1e-3 20
+robot.touch_sigma_mm mm 0.03 1e-5 1
 robot.radius_sigma_mm mm 0.001 0 10
 robot.place_sigma_mm mm 0 0 100
 robot.turn_sigma_deg degrees 0 0 20
@@ -119,6 +121,7 @@ scan.file - -
 scan.unit mm m,mm,inch
 robot.model ur5e ur3e,ur5e,ur10e,ur16e,urdf
 robot.urdf - -
+robot.check - -
 robot.base_link 'base_link' -
 robot.flange_link 'tool0' -
 robot.allow_motion false -
@@ -221,6 +224,8 @@ fn each_parameter_is_explained_and_has_its_unit_in_its_key() {
         ("mm", "_mm"),
         ("ms", "_ms"),
         ("s", "_s"),
+        ("days", "_days"),
+        ("°C", "_c"),
         ("N", "_n"),
         ("N·m", "_nm"),
         ("kg", "_kg"),

@@ -20,7 +20,7 @@ mod workspace;
 
 pub use dwell::{Dwell, DwellFinder, DwellParams};
 pub use payload::{PayloadError, PayloadFit, PayloadParams, VectorEstimate, fit_payload};
-pub use sphere::{ReferenceSphere, SphereFit, fit_sphere};
+pub use sphere::{ReferenceSphere, SphereFit, beside_spheres, fit_sphere};
 pub(crate) use static_segments::SampleBlock;
 pub use static_segments::{StaticPose, StaticSegmentFinder, StaticSegmentParams};
 pub use tip::{SwingPose, TipError, TipFit, TipFitParams, fit_tip};

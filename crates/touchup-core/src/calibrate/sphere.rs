@@ -96,7 +96,7 @@ impl ReferenceSphere {
     ///
     /// # Errors
     /// [`MeshError`] where centre or radius is no number.
-    pub fn mesh(&self) -> Result<TriMesh, MeshError> {
+    fn mesh(&self) -> Result<TriMesh, MeshError> {
         let rings = SEGMENTS / 2;
         let on_ring = |ring: u32| {
             (0..SEGMENTS).map(move |at| {
@@ -122,6 +122,21 @@ impl ReferenceSphere {
         }
         TriMesh::new(positions, faces)
     }
+}
+
+/// A mesh with the surfaces of spheres beside it.
+///
+/// # Errors
+/// [`MeshError`] where the centre or radius of a sphere is no number, or there is too much of it.
+pub fn beside_spheres(part: &TriMesh, spheres: &[ReferenceSphere]) -> Result<TriMesh, MeshError> {
+    let mut positions = part.positions().to_vec();
+    let mut faces: Vec<_> = part.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
+    for sphere in spheres {
+        let (mesh, first) = (sphere.mesh()?, positions.len() as u32);
+        positions.extend(mesh.positions());
+        faces.extend(mesh.faces().map(|(_, corners)| corners.map(|corner| first + corner.0)));
+    }
+    TriMesh::new(positions, faces)
 }
 
 #[cfg(test)]

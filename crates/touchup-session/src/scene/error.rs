@@ -29,6 +29,9 @@ pub enum SceneError {
     /// The description of the arm.
     #[error(transparent)]
     Urdf(#[from] touchup_io::urdf::UrdfError),
+    /// The record of its check.
+    #[error(transparent)]
+    Check(#[from] super::CheckRecordError),
     /// No face of the scan is near the region that is touched.
     #[error("no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?")]
     EmptyRegion,

@@ -4,6 +4,7 @@
 //! without keys takes its defaults. Each parameter is declared once, by [`touchup_core::parameters!`], in the module that it belongs to;
 //! `config/default.yaml` is [`Scene::template`] and docs/scene.md is [`Scene::table`].
 
+mod arm_check;
 mod built;
 mod edit;
 mod error;
@@ -14,6 +15,7 @@ mod template;
 
 use std::path::{Path, PathBuf};
 
+pub use arm_check::{CheckDoubt, CheckRecord, CheckRecordError, CheckStanding};
 pub use built::{Built, Memory, SceneCost};
 pub use edit::Setting;
 use error::yaml_error;
@@ -106,7 +108,9 @@ impl Scene {
         let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
         let mut scene = Self::from_yaml(&yaml).map_err(in_file)?;
         if let Some(robot) = &mut scene.robot {
-            robot.read_urdf(path.parent().unwrap_or(Path::new("")))?;
+            let folder = path.parent().unwrap_or(Path::new(""));
+            robot.read_urdf(folder)?;
+            robot.read_check(folder)?;
         }
         Ok((scene, yaml))
     }

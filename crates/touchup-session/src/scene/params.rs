@@ -34,7 +34,7 @@ impl Scene {
     /// The robot cell, and how is probed in it; `None` without `robot`.
     pub fn probing(&self) -> Option<(Cell, ProbeParams)> {
         let (robot, TipParams { radius: ball_radius, stiffness }) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
-        let RobotSection { limits, touch, pattern, tool, .. } = robot;
+        let RobotSection { limits, touch, tool, .. } = robot;
         let cell = Cell {
             geometry: match &robot.chain {
                 Some(chain) => ArmGeometry::Chain(chain.clone()),
@@ -50,7 +50,7 @@ impl Scene {
             ..*touch
         };
         let sigma = sigma_of(robot.tolerance, robot.confidence);
-        let pattern = PatternParams { ball_radius, sigma, ..*pattern };
+        let pattern = PatternParams { ball_radius, sigma, ..robot.checked_pattern() };
         Some((cell, ProbeParams { touch, pattern, slides: false, limits: limits.clone() }))
     }
 

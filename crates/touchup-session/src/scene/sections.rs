@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 
+use super::{CheckRecord, CheckRecordError, CheckStanding};
 use touchup_core::haptic::{Along, ScanParams, SigmoidParams, StepRule, TipParams};
 use touchup_core::probing::arm::{Limits, SerialChain, TouchParams};
 use touchup_core::probing::execute::Tool;
-use touchup_core::probing::plan::PatternParams;
+use touchup_core::probing::plan::{ArmUncertainty, PatternParams};
 use touchup_core::stylus::{
     MarkerBody, MarkerParams, Payload, SensorBias, SensorMount, SettingError, TipShape, TipSizes,
 };
@@ -290,6 +292,18 @@ parameters! {
         link_radius: f64 = 60.0, "link_radius_mm" [MM, 1, 1000];
         /// Not in the scene: what the URDF describes.
         chain: Option<Arc<SerialChain>> = None;
+        /// The record that `touchup check --out` wrote, relative to the folder of this scene; what it found is in each ±.
+        check: Option<PathBuf> = None, "check" like "check.json";
+        /// For how long a check counts: an older one stands in each result.
+        ///
+        /// days.
+        check_days: f64 = 30.0, "check_days" [DAYS, 0.01, 3650];
+        /// Temperature of the cell: where a check was made at one that differs by more than 5 K, that stands in each result.
+        ///
+        /// °C.
+        temperature_c: Option<f64> = None, "temperature_c" [CELSIUS, -50, 100] like "21.5";
+        /// Not in the scene: what the record holds.
+        check_record: Option<CheckRecord> = None;
         /// Whether it may move at all; without it plans can be made and drawn.
         allow_motion: bool = false, "allow_motion";
         /// Name or address of its controller; a simulated arm has none.
@@ -311,7 +325,7 @@ parameters! {
         /// The numbers of a feature are to be known within ± this, with the probability `confidence`.
         ///
         /// m.
-        tolerance: f64 = 0.02, "tolerance_mm" [MM, 0.0001, 10];
+        tolerance: f64 = 0.05, "tolerance_mm" [MM, 0.0001, 10];
         /// Probability with which they are within the tolerance.
         confidence: f64 = 0.95, "confidence" [ONE, 0.5, 0.9999];
     }
@@ -341,6 +355,46 @@ impl RobotSection {
         let links = ArmLinks { base: &self.base_link, flange: &self.flange_link, radius: self.link_radius };
         self.chain = Some(Arc::new(read_urdf(&folder.join(file), &links)?));
         Ok(())
+    }
+
+    /// Reads the record of its check, where there is one.
+    ///
+    /// - `folder`: of the scene.
+    pub(super) fn read_check(&mut self, folder: &Path) -> Result<(), CheckRecordError> {
+        let Some(file) = &self.check else { return Ok(()) };
+        self.check_record = CheckRecord::read(&folder.join(file))?;
+        Ok(())
+    }
+
+    /// Its model; of a URDF also which.
+    pub fn model_name(&self) -> String {
+        match &self.urdf {
+            Some(file) if self.model == ArmModel::Urdf => format!("{}: {}", self.model.name(), file.display()),
+            _ => self.model.name().to_owned(),
+        }
+    }
+
+    /// What stands in each result of the check of the arm.
+    ///
+    /// - `now`: of a clock of the date.
+    pub fn check_standing(&self, now: SystemTime) -> CheckStanding {
+        let named = (self.check.as_deref(), self.check_record.as_ref());
+        CheckStanding::of(named, &self.model_name(), now, self.check_days, self.temperature_c)
+    }
+
+    /// The record of the check, where it is one of this arm.
+    fn own_check(&self) -> Option<&CheckRecord> {
+        self.check_record.as_ref().filter(|record| record.is_of(&self.model_name()))
+    }
+
+    /// What is wanted of a feature, with what a check of the arm has found: of repeatability and growth the larger of measured and told, for a
+    /// check of few touches can be lucky, and what a maker states can be.
+    pub(super) fn checked_pattern(&self) -> PatternParams {
+        let Some(record) = self.own_check() else { return self.pattern };
+        let growth = record.growth_mm_per_m.map_or(0.0, |growth| growth / 1e3);
+        let shared = ArmUncertainty { growth: self.pattern.shared.growth.max(growth), ..self.pattern.shared };
+        let touch_sigma = self.pattern.touch_sigma.max(record.repeatability_mm / 1e3);
+        PatternParams { touch_sigma, shared, ..self.pattern }
     }
 
     /// The tip in the flange.

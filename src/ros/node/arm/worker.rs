@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use tracing::{info, warn};
 
@@ -282,6 +282,14 @@ impl ArmWorker {
         result.send((end, response));
     }
 
+    /// What casts doubt on the check of the arm, behind how a probing ended; empty: nothing does.
+    fn doubts_of_check(&self) -> String {
+        let robot = self.link.setup.scene.robot.as_ref();
+        let standing = robot.map(|robot| robot.check_standing(SystemTime::now()));
+        let doubtful = standing.filter(|standing| !standing.doubts.is_empty());
+        doubtful.map_or_else(String::new, |standing| format!("; {standing}"))
+    }
+
     /// A result as it is now, for who follows and for who asked.
     fn done(&self, result: ProbeResult) -> ProbeResult {
         let result = ProbeResult { header: self.header(), ..result };
@@ -443,6 +451,7 @@ impl ArmWorker {
                 result.code = code;
             }
         }
+        result.message += &self.doubts_of_check();
         result
     }
 }

@@ -180,9 +180,14 @@ fn a_hole_is_found_from_one_click_and_measured() {
         let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
         let flag = Point3::new(x + off * angle.cos(), y + off * angle.sin(), TOP + rng.random_range(-0.5e-3..0.5e-3));
         let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [x, y, 30e-3])).unwrap();
-        let mut search =
-            Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1))
-                .unwrap();
+        let mut search = Explorer::new(
+            Some(Kind::Hole),
+            &flag,
+            &Vector3::z_axis(),
+            PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
+            &plate_scan(1),
+        )
+        .unwrap();
         let peak = explored(&mut arm, &params, &touching, &mut search);
         let found = search.found().unwrap();
         let feature = found.feature.as_ref().unwrap();
@@ -212,8 +217,14 @@ fn where_no_hole_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 8e-3, TOP);
-    let mut search =
-        Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1)).unwrap();
+    let mut search = Explorer::new(
+        Some(Kind::Hole),
+        &flag,
+        &Vector3::z_axis(),
+        PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
+        &plate_scan(1),
+    )
+    .unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
     assert!(matches!(search.found(), Err(ExploreError::NotFound { .. })), "{:?}", search.found());
 }
@@ -631,7 +642,7 @@ fn value(measured: &Option<Measured<f64>>) -> f64 {
 /// The slot of the plate: from (18 14) to (32 14) mm with a radius of 3 mm, 5 mm deep.
 #[test]
 fn a_slot_is_found_from_one_click_and_measured() {
-    let params = PatternParams { budget: 60, ..PatternParams::default() };
+    let params = PatternParams { budget: 60, touch_sigma: 5e-6, ..PatternParams::default() };
     for seed in 0..4 {
         let (slot, touches, peak) = explored_from(Kind::Slot, Point3::new(25e-3, 14e-3, TOP), seed, params);
         let errors = [
@@ -650,7 +661,7 @@ fn a_slot_is_found_from_one_click_and_measured() {
 /// The boss of the plate: at (47 25) mm, radius 5 mm, 4 mm high.
 #[test]
 fn a_boss_is_found_from_one_click_and_measured() {
-    let params = PatternParams { budget: 60, ..PatternParams::default() };
+    let params = PatternParams { budget: 60, touch_sigma: 5e-6, ..PatternParams::default() };
     for seed in 0..4 {
         let (boss, touches, peak) = explored_from(Kind::Boss, Point3::new(47e-3, 25e-3, TOP + 4e-3), seed, params);
         let errors = [
@@ -667,7 +678,7 @@ fn a_boss_is_found_from_one_click_and_measured() {
 /// The step of the plate: its upper edge runs along y at x = 60 mm, 3 mm above the ground.
 #[test]
 fn an_edge_is_found_from_one_click_and_measured() {
-    let params = PatternParams { budget: 60, ..PatternParams::default() };
+    let params = PatternParams { budget: 60, touch_sigma: 5e-6, ..PatternParams::default() };
     for seed in 0..4 {
         let (edge, touches, peak) = explored_from(Kind::Edge, Point3::new(60e-3, 25e-3, TOP), seed, params);
         let centre = edge.centre.value;
@@ -681,7 +692,7 @@ fn an_edge_is_found_from_one_click_and_measured() {
 /// The top of the plate beside its slot.
 #[test]
 fn a_plane_is_measured() {
-    let params = PatternParams { flag_radius: 5e-3, sigma: 10e-6, ..PatternParams::default() };
+    let params = PatternParams { flag_radius: 5e-3, sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
     for seed in 0..4 {
         let (plane, touches, _) = explored_from(Kind::Plane, Point3::new(45e-3, 9e-3, TOP), seed, params);
         let normal = plane.axis.unwrap().value;
@@ -696,8 +707,14 @@ fn where_no_edge_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 9e-3, TOP);
-    let mut search =
-        Explorer::new(Some(Kind::Edge), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1)).unwrap();
+    let mut search = Explorer::new(
+        Some(Kind::Edge),
+        &flag,
+        &Vector3::z_axis(),
+        PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
+        &plate_scan(1),
+    )
+    .unwrap();
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
     assert!(matches!(search.found(), Err(ExploreError::NoEdge { .. })), "{:?}", search.found());
 }

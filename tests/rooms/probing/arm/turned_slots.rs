@@ -95,9 +95,14 @@ fn a_slot_is_found_at_every_angle() {
             let flag = Point3::from(MIDDLE) + Vector3::new(off * f64::cos(turn), off * f64::sin(turn), 0.2e-3);
             let start = at(&params, [MIDDLE[0], MIDDLE[1], 30e-3]);
             let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
-            let mut search =
-                Explorer::new(Some(Kind::Slot), &flag, &Vector3::z_axis(), PatternParams::default(), &plate_scan(1))
-                    .unwrap();
+            let mut search = Explorer::new(
+                Some(Kind::Slot),
+                &flag,
+                &Vector3::z_axis(),
+                PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
+                &plate_scan(1),
+            )
+            .unwrap();
             explored(&mut arm, &params, &touching, &mut search);
             let said = match search.found().map(|found| (found.touches, found.feature)) {
                 Err(error) => error.to_string(),

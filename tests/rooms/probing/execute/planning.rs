@@ -163,7 +163,7 @@ fn a_flag_becomes_a_feature_with_seven_joints_as_with_a_ur() {
 #[test]
 fn exhausted_limits_are_reported() {
     let of = |params: ProbeParams| probed(&params, &mut StaticScan::new(plate_scan(1)), |_| {}).0;
-    let few = PatternParams { budget: 13, sigma: 1e-9, ..PatternParams::default() };
+    let few = PatternParams { budget: 13, sigma: 1e-9, touch_sigma: 5e-6, ..PatternParams::default() };
     let spent = of(ProbeParams { pattern: few, ..params() });
     assert_eq!((spent.ending, spent.touches.len()), (Ending::TouchesSpent, 13));
     assert!(spent.found.is_some(), "it is as good as they made it");

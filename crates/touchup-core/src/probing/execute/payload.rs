@@ -87,7 +87,7 @@ impl Prober<'_> {
         Ok(PayloadReadings { segments, not_reached })
     }
 
-    fn turn_along(&mut self, route: &Route) -> Result<(), Ending> {
+    pub(super) fn turn_along(&mut self, route: &Route) -> Result<(), Ending> {
         let (cell, touch, most) = (self.cell, &self.params.touch, self.params.limits.force);
         let mut watched = self.watched();
         for (place, rotation) in &route.stops {

@@ -10,6 +10,7 @@ use super::ending::Ending;
 use super::feature_probing::FeatureProbing;
 use super::prober::Prober;
 use super::repeat::SpotError;
+use super::route::ToolState;
 use crate::calibrate::ReferenceSphere;
 use crate::numeric::tangent_basis;
 use crate::probing::plan::TouchPlan;
@@ -45,7 +46,8 @@ const STANDOFF: f64 = 3e-3;
 const ABOVE: f64 = 5e-3;
 
 impl Prober<'_> {
-    /// Touches a sphere in several orientations of the probe around that in which it is held; those that it does not get to are left out.
+    /// Touches a sphere in several orientations of the probe around that in which it is held; those that it does not get to are left out. It
+    /// goes back to where it began.
     ///
     /// The mesh of the world has to hold the sphere, so that no link leads through it.
     ///
@@ -54,15 +56,19 @@ impl Prober<'_> {
     /// # Errors
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
-        let upright = self.in_free_air(self.params.limits.tare)?.pose_bt.rotation;
+        let home = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
         let mut touched = SphereTouches { orientations: Vec::new(), not_reached: Vec::new() };
         let mut made = 0;
         for orientation in rings(RINGS) {
-            match self.touch_oriented(sphere, &leaned(&upright, &orientation), &mut made)? {
+            match self.touch_oriented(sphere, &leaned(&home.rotation, &orientation), &mut made)? {
                 Ok(centres) => touched.orientations.push(SphereOrientation { orientation, centres }),
                 Err(why) => touched.not_reached.push(NotReached { orientation, why }),
             }
         }
+        // as it was held before
+        let here = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
+        let back = self.space().route(&here, &home.rotation, &home.place)?;
+        self.turn_along(&back)?;
         Ok(touched)
     }
 
