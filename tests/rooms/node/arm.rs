@@ -22,7 +22,11 @@ fn what_was_found_is_slid_over_where_that_is_asked_for() {
     assert!(planned.code == ProbeResult::PLANNED && planned.message.contains("and 1 slides"), "{}", planned.message);
     let result = cell.probe(id, slide);
     assert_eq!(result.code, ProbeResult::TOLERANCE_REACHED, "{}", result.message);
-    assert!(result.message.ends_with("1 of 1 slides arrived"), "{}", result.message);
+    assert!(
+        result.message.contains("1 of 1 slides arrived; check of the arm: none: robot.check"),
+        "{}",
+        result.message
+    );
     // to and fro over a disc with a radius of 3 mm, 1.5 mm apart, at 10 mm/s
     assert!(result.duration > 2.0 && result.max_force < 4.5, "{} s, {} N", result.duration, result.max_force);
     cell.end();

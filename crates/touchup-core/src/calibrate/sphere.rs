@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn too_few_touches_and_touches_in_a_plane_are_no_sphere() {
-        let ring: Vec<_> = (0..6).map(|at| f64::from(at)).map(|a| Point3::new(a.cos(), a.sin(), 0.0)).collect();
+        let ring: Vec<_> = (0..6).map(f64::from).map(|a| Point3::new(a.cos(), a.sin(), 0.0)).collect();
         assert_eq!(fit_sphere(&ring), None);
         assert_eq!(fit_sphere(&ring[..4]), None);
         assert_eq!(fit_sphere(&[Point3::origin(); 7]), None);
