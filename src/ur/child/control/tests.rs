@@ -394,6 +394,12 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
 /// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the old velocity.
 #[test]
 fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
+    for (fails, braked) in [(Action::Stop { deceleration: 0.5 }, Speed(0.0, 0.5)), (UP, Speed(0.0, 2.0))] {
+        brakes_after_a_failed(fails, braked);
+    }
+}
+
+fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.shared.is_ready.store(true, Ordering::Release);
@@ -401,23 +407,26 @@ fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
     bench.order(&mut driver, 1, UP);
     // the call fails before any state says why
     bench.fake.refuses.set(true);
-    bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
+    bench.order(&mut driver, 2, order);
     bench.goes(0.0, Paused);
     bench.calls();
     bench.without_orders(&mut driver, 2_000);
     assert_eq!(bench.calls(), [], "a program that is paused hears nothing, and is not fed");
     bench.fake.refuses.set(false);
+    // its first states are those of an arm that does not move yet
+    bench.goes(0.0, Playing);
+    bench.without_orders(&mut driver, 10);
     bench.goes(40e-3, Playing);
     bench.without_orders(&mut driver, 50);
     let calls = bench.calls();
-    assert_eq!(calls[0].1, Speed(0.0, 0.5), "at once: {calls:?}");
-    assert!(calls.iter().all(|(_, call)| *call == Speed(0.0, 0.5)), "{calls:?}");
+    assert_eq!(calls[0].1, braked, "at once: {calls:?}");
+    assert!(calls.iter().all(|(_, call)| *call == braked), "{calls:?}");
     bench.goes(0.0, Playing);
     bench.without_orders(&mut driver, 500);
     let calls = bench.calls();
     let (last, braking) = calls.split_last().unwrap();
     assert_eq!(last.1, HardStop(10.0), "once it is seen at rest, and nothing is fed after it: {calls:?}");
-    assert!(!braking.is_empty() && braking.iter().all(|(_, call)| *call == Speed(0.0, 0.5)), "{calls:?}");
+    assert!(!braking.is_empty() && braking.iter().all(|(_, call)| *call == braked), "{calls:?}");
 }
 
 #[test]
