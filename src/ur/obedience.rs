@@ -279,7 +279,7 @@ mod tests {
         let seen = first_fault_of(600, order, creeping(2e-3)).unwrap();
         assert!((320..=345).contains(&seen), "{seen} ms");
         // the noise of a place, 10 um, and one that follows its order
-        let noisy = |at: u32| (along(if at % 4 == 0 { 30e-6 } else { -30e-6 }), along(0.0));
+        let noisy = |at: u32| (along(if at.is_multiple_of(4) { 30e-6 } else { -30e-6 }), along(0.0));
         assert_eq!(first_fault_of(2000, |_| Some(STOP), noisy), None);
         assert_eq!(first_fault_of(2000, |_| Some(go(2e-3)), creeping(2e-3)), None);
         let turning = |at: u32| ([0.0, 0.0, 0.0, 0.0, 0.0, 0.02 * f64::from(at) * 1e-3], [0.0; 6]);
