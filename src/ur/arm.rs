@@ -9,14 +9,13 @@ use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use super::client::Client;
 use super::dashboard::Dashboard;
 use super::error::UrError;
-use super::freshness::Freshness;
 use super::guard::Halt;
 use super::lateness::StartLateness;
 use super::params::UrParams;
 use super::priority;
 use super::probe::probe;
 use super::protocol::{Action, UrState, pose_of, vector_of};
-use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety, Slowed};
+use crate::probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed, velocity_towards};
 use crate::stylus::Wrench;
 
 /// Time between two states, s: an e-Series sends them at 500 Hz.
@@ -28,12 +27,8 @@ const SAME_PERIOD: f64 = 1.5;
 /// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise. An assumption, not yet
 /// verified on a robot: docs/ur.md has the check.
 const FORCE_SIGN: f64 = 1.0;
-/// Share of the acceleration that a line counts on when it brakes: the arm follows some milliseconds late.
-const BRAKE: f64 = 0.7;
 /// A line comes to its end with this time constant, s: four times what passes from a state to the motion that answers it.
 const SETTLING_TIME: f64 = 60e-3;
-/// Most that a line turns the tip, rad/s.
-const TURN: f64 = 0.5;
 /// Of the feed while pressing, m/s².
 const FEED_ACCELERATION: f64 = 0.5;
 /// Most that anything may ask for, m/s².
@@ -94,7 +89,7 @@ impl UrArm {
         if let Some(slowed) = last.slowed() {
             tracing::warn!("{slowed}: links, searches and retractions take as much longer, and may end as not arrived");
         }
-        Ok(Self { params: params.clone(), client, last, freshness: Freshness::default() })
+        Ok(Self { params: params.clone(), client, last, freshness: Freshness::new(PERIOD) })
     }
 
     /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing moves.
@@ -219,7 +214,10 @@ pub(super) fn order_of(command: &Command, last: &UrState, params: &UrParams) -> 
             if !is_pose {
                 return Err(refused("a line", "its end is no pose"));
             }
-            Ok(Action::Move { twist: towards(&pose_of(last.pose), &to, speed, acceleration), acceleration })
+            Ok(Action::Move {
+                twist: velocity_towards(&pose_of(last.pose), &to, [speed, acceleration], SETTLING_TIME),
+                acceleration,
+            })
         }
         Command::Velocity { linear, acceleration } => {
             check(params, "a velocity", linear.norm(), acceleration)?;
@@ -263,20 +261,6 @@ fn check(params: &UrParams, what: &'static str, speed: f64, acceleration: f64) -
     Ok(())
 }
 
-/// Velocity of the tip towards a pose, m/s and rad/s in B; both come to their end together.
-fn towards(from: &Isometry3<f64>, to: &Isometry3<f64>, speed: f64, acceleration: f64) -> [f64; 6] {
-    let left = to.translation.vector - from.translation.vector;
-    let turn = (to.rotation * from.rotation.inverse()).scaled_axis();
-    let distance = left.norm();
-    // share of the path in a second; at the end itself all but the settling is without bound
-    let share = (1.0 / SETTLING_TIME)
-        .min(speed / distance)
-        .min((2.0 * BRAKE * acceleration / distance).sqrt())
-        .min(TURN / turn.norm());
-    let (linear, angular) = (left * share, turn * share);
-    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
-}
-
 /// Some orientation in B whose z is a direction; `None`: it is none.
 fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
     let axis = axis.try_normalize(0.5).filter(|axis| axis.iter().all(|part| part.is_finite()))?;
@@ -289,27 +273,6 @@ fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_line_is_slower_near_its_end_and_straight() {
-        let at = |x: f64, angle: f64| {
-            Isometry3::from_parts(
-                Vector3::new(x, 0.0, 0.0).into(),
-                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle),
-            )
-        };
-        let far = towards(&at(0.0, 0.0), &at(0.4, 0.0), 0.1, 0.5);
-        assert_eq!(far, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        // 10 mm before the end: by √(2 · 0.7 · 0.5 · 0.01) = 83.7 mm/s it can still stop
-        let near = towards(&at(0.39, 0.0), &at(0.4, 0.0), 0.1, 0.5)[0];
-        assert!((near - 0.083_666).abs() < 1e-6, "{near}");
-        // half a millimetre: 0.5 / 60 ms
-        assert!((towards(&at(0.3995, 0.0), &at(0.4, 0.0), 0.1, 0.5)[0] - 8.333e-3).abs() < 1e-6);
-        assert_eq!(towards(&at(0.4, 0.0), &at(0.4, 0.0), 0.1, 0.5), [0.0; 6]);
-        // one radian at 0.5 rad/s takes 2 s, and so do the 20 mm
-        let turning = towards(&at(0.0, 0.0), &at(0.02, 1.0), 0.1, 0.5);
-        assert!((turning[0] - 0.01).abs() < 1e-12 && (turning[5] - 0.5).abs() < 1e-12, "{turning:?}");
-    }
 
     #[test]
     fn the_frame_of_a_press_has_its_z_along_the_axis() {

@@ -11,14 +11,15 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use nalgebra::Vector3;
+
 use super::dashboard::Dashboard;
 use super::lateness::Lateness;
-use super::obedience::Obedience;
 use super::params::Deadlines;
 use super::priority;
-use super::protocol::{Action, ClientReport, Link, ProgramState, UrState};
+use super::protocol::{Action, ClientReport, Link, ProgramState, UrState, pose_of};
 use crate::clock::{Clock, ManualClock};
-use crate::probing::arm::{ArmError, Safety};
+use crate::probing::arm::{ArmError, Obedience, OrderedMotion, Safety};
 
 /// States that wait for a late caller, 128 ms of them; older ones are dropped.
 const WAITING: usize = 64;
@@ -26,6 +27,8 @@ const WAITING: usize = 64;
 pub(super) const ENDED: Duration = Duration::from_millis(40);
 /// Zeroing, with the braking before it, has this much time.
 pub(super) const ZEROING: Duration = Duration::from_secs(3);
+/// Deceleration of that braking, m/s².
+const ZEROING_STOP: f64 = 2.0;
 /// A dashboard that did not stop the arm is asked again this often.
 pub(super) const AGAIN: Duration = Duration::from_millis(100);
 /// The client ends by itself within this time of its stdin.
@@ -157,6 +160,19 @@ impl ClientLoss {
     }
 }
 
+/// What of an order shows in the velocity of the arm.
+fn ordered(what: &Action) -> OrderedMotion {
+    match *what {
+        Action::Move { twist, acceleration } => OrderedMotion::Move { twist, acceleration },
+        Action::Press { frame, speed, feed, acceleration, .. } => {
+            let axis = pose_of(frame).rotation * Vector3::z();
+            OrderedMotion::Press { axis, speed, feed: feed.into(), acceleration }
+        }
+        Action::Stop { deceleration } => OrderedMotion::Stop { deceleration },
+        Action::Zero => OrderedMotion::Stop { deceleration: ZEROING_STOP },
+    }
+}
+
 impl GuardState {
     pub fn new(deadlines: Deadlines, now: Instant) -> Self {
         Self {
@@ -174,7 +190,7 @@ impl GuardState {
             ended_since: None,
             was_paused: false,
             has_halted: false,
-            obedience: Obedience::new(now),
+            obedience: Obedience::new(Duration::ZERO),
             lateness: Lateness::new(now),
             broken: None,
             closing_since: None,
@@ -185,7 +201,7 @@ impl GuardState {
     pub fn send(&mut self, what: &Action, now: Instant) -> u64 {
         self.sent += 1;
         self.waiting_since.get_or_insert(now);
-        self.obedience.order(what, now);
+        self.obedience.order(&ordered(what), now.saturating_duration_since(self.begun_at));
         if *what == Action::Zero {
             self.asked = Some(self.sent);
         }
@@ -243,7 +259,8 @@ impl GuardState {
                 (self.is_ready, self.fresh_at) = (true, Some(now));
                 // those of before have the pose of another tool
                 self.states.clear();
-                (self.obedience, self.lateness) = (Obedience::new(now), Lateness::new(now));
+                self.obedience = Obedience::new(now.saturating_duration_since(self.begun_at));
+                self.lateness = Lateness::new(now);
             }
             ClientReport::State(state) => {
                 (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
@@ -258,7 +275,9 @@ impl GuardState {
                 self.serve(state.served, now);
                 // what does not play is somebody else's, or stands
                 let disobeys = self.is_ready && !self.has_halted && state.may_move();
-                if let Some(fault) = disobeys.then(|| self.obedience.see(state.pose, &state.velocity, now)).flatten() {
+                let since = now.saturating_duration_since(self.begun_at);
+                let pose = pose_of(state.pose);
+                if let Some(fault) = disobeys.then(|| self.obedience.see(&pose, &state.velocity, since)).flatten() {
                     return Some(ClientLoss::Arm(fault));
                 }
             }

@@ -171,13 +171,24 @@ fn cancelled(request: StopRequest) -> u8 {
 fn stopped(error: &ProbeError) -> u8 {
     match error {
         ProbeError::Arm { error, .. } => match error {
-            ArmError::Lost { .. } | ArmError::Dropped { .. } | ArmError::ProgramEnded => ProbeResult::LINK_LOST,
+            ArmError::Lost { .. }
+            | ArmError::Dropped { .. }
+            | ArmError::TopicSilent { .. }
+            | ArmError::ProgramEnded => ProbeResult::LINK_LOST,
             // most often a door
             ArmError::ProgramPaused => ProbeResult::OPERATOR_STOP,
-            ArmError::Stale | ArmError::WentBack { .. } | ArmError::Behind { .. } => ProbeResult::DATA_LOST,
+            ArmError::Stale
+            | ArmError::WentBack { .. }
+            | ArmError::JumpedAhead { .. }
+            | ArmError::Behind { .. }
+            | ArmError::Late { .. }
+            | ArmError::Unreadable { .. } => ProbeResult::DATA_LOST,
             ArmError::Stopped { safety: Safety::OperatorStop } => ProbeResult::OPERATOR_STOP,
             ArmError::Stopped { .. } => ProbeResult::PROTECTIVE_STOP,
-            ArmError::Client { .. } | ArmError::Disobeys { .. } => ProbeResult::DRIVER_LOST,
+            ArmError::Client { .. }
+            | ArmError::Disobeys { .. }
+            | ArmError::Ignores { .. }
+            | ArmError::GoesOn { .. } => ProbeResult::DRIVER_LOST,
             ArmError::Refused { .. } => ProbeResult::FAULT,
         },
         ProbeError::Limit { error: LimitError::Force { .. }, .. } => ProbeResult::FORCE_OVER_LIMIT,

@@ -59,8 +59,15 @@ impl Common {
     /// None came; whether that is new.
     pub fn miss(&self, error: &ArmError) -> bool {
         let mut seen = locked(&self.seen);
-        use ArmError::{Client, Disobeys, ProgramEnded, ProgramPaused, Stopped};
-        if let Stopped { .. } | ProgramEnded | ProgramPaused | Disobeys { .. } | Client { .. } = error {
+        use ArmError::{Client, Disobeys, GoesOn, Ignores, ProgramEnded, ProgramPaused, Stopped};
+        if let Stopped { .. }
+        | ProgramEnded
+        | ProgramPaused
+        | Disobeys { .. }
+        | Ignores { .. }
+        | GoesOn { .. }
+        | Client { .. } = error
+        {
             seen.stop.get_or_insert_with(|| error.to_string());
         }
         seen.fault.replace(error.to_string()).is_none()

@@ -173,6 +173,64 @@ pub enum ArmError {
         /// of its turning, °/s
         deg_per_s: f64,
     },
+    /// One of the topics that its state comes on is silent, or old.
+    #[error(
+        "{topic} brings nothing new for {silent_ms:.0} ms: is its broadcaster active (`ros2 control list_controllers`), and the network up?"
+    )]
+    TopicSilent {
+        /// its name
+        topic: String,
+        /// ms
+        silent_ms: f64,
+    },
+    /// The stamps go on faster than time.
+    #[error("the stamps of {topic} jumped ahead by {ahead_ms:.0} ms: its clock was set, or two senders answer")]
+    JumpedAhead {
+        /// its name
+        topic: String,
+        /// ms
+        ahead_ms: f64,
+    },
+    /// States come later than they did.
+    #[error("{topic} comes {late_ms:.0} ms later than it did: the network, the controller or this machine is busy")]
+    Late {
+        /// its name
+        topic: String,
+        /// ms
+        late_ms: f64,
+    },
+    /// A message of the arm that cannot be its own.
+    #[error("{topic}: {reason}")]
+    Unreadable {
+        /// its name
+        topic: String,
+        /// what is wrong with it, and what to do
+        reason: String,
+    },
+    /// It stands though it is ordered to move.
+    #[error(
+        "the arm has moved {moved_deg:.2}° where {ordered_deg:.2}° were ordered: is the controller of {topic} active (`ros2 control \
+         list_controllers`), and does it take velocities (docs/ros2_control.md)?"
+    )]
+    Ignores {
+        /// where orders go
+        topic: String,
+        /// way of the joints by the orders, °
+        ordered_deg: f64,
+        /// way of the joints as measured, °
+        moved_deg: f64,
+    },
+    /// It was ordered to stop and goes on.
+    #[error(
+        "the arm still moves with {mm_per_s:.0} mm/s after it was ordered to stop ({first}), and there is no other way to stop it from \
+         here: press its emergency stop, then look what else commands it"
+    )]
+    GoesOn {
+        /// of the tip, mm/s
+        mm_per_s: f64,
+        /// why it was ordered to stop
+        first: String,
+    },
     /// The connection to the arm has failed; the arm was stopped by other means.
     #[error("the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover")]
     Client {

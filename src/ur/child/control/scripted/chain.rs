@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::{Control, Driver, TURN};
 use crate::clock::{Clock, ManualClock};
-use crate::probing::arm::{Arm, ArmError, ArmState, Command, Safety, Slowed};
+use crate::probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed};
 use crate::sim::{ArmParams, Plate, WEIGHTLESS};
 use crate::stylus::Payload;
 use crate::ur::UrParams;
@@ -18,7 +18,6 @@ use crate::ur::arm::{PERIOD, order_of, seen};
 use crate::ur::child::error::ChildError;
 use crate::ur::child::shared::ChildShared;
 use crate::ur::child::states::LastReport;
-use crate::ur::freshness::Freshness;
 use crate::ur::guard::{AGAIN, ClientLoss, GuardState};
 use crate::ur::params::Deadlines;
 use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order, ProgramState, UrState, vector_of};
@@ -408,7 +407,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
             library,
             driver,
             params: UrParams::new("", ""),
-            freshness: Freshness::default(),
+            freshness: Freshness::new(PERIOD),
             last: world.state_of(&world.states.borrow()),
             waiting: Vec::new(),
             looked: world.clock.now(),

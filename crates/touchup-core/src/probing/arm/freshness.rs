@@ -3,21 +3,30 @@
 //! A caller that was held up finds states that waited. What it orders by them would follow a place and a force of the past: such an order
 //! is not sent, and where none is sent the child brakes. Once the caller has taken what waited its orders go out again.
 
-use crate::probing::arm::ArmError;
+use super::interface::ArmError;
 
-/// The state that an order follows may be so much older than the newest, s: two periods of the arm, and the rounding of stamps.
-const OLD: f64 = 2.0 * 2e-3 + 0.5e-3;
+/// The state that an order follows may be older than the newest by so many periods of the arm …
+const OLD: f64 = 2.0;
+/// … and by the rounding of stamps, s.
+const ROUNDING: f64 = 0.5e-3;
 /// A caller that does not catch up within this time is too slow for the arm, s.
 const CATCHES_UP: f64 = 0.2;
 
 /// How long a caller has been behind the arm.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Freshness {
+#[derive(Clone, Copy, Debug)]
+pub struct Freshness {
+    /// an order may follow a state that is so much older than the newest, s
+    old: f64,
     /// stamp of the newest state at the first order that was not sent, s
     behind_since_s: Option<f64>,
 }
 
 impl Freshness {
+    /// - `period`: between two states of the arm, s.
+    pub fn new(period: f64) -> Self {
+        Self { old: OLD * period + ROUNDING, behind_since_s: None }
+    }
+
     /// Whether an order may go out.
     ///
     /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come, s; `late_s`: how late that came, s.
@@ -26,7 +35,7 @@ impl Freshness {
     /// [`ArmError::Behind`] for a caller that does not catch up.
     pub fn may_send(&mut self, followed_s: f64, (newest_s, late_s): (f64, f64)) -> Result<bool, ArmError> {
         let age = newest_s - followed_s + late_s;
-        if age.is_nan() || age <= OLD {
+        if age.is_nan() || age <= self.old {
             self.behind_since_s = None;
             return Ok(true);
         }
@@ -46,7 +55,7 @@ mod tests {
     /// The orders of a caller that takes one state each so many ms from an arm that makes one each 2 ms; it was held up for so long, ms,
     /// at the beginning. Of each order: when, ms, whether it went out.
     fn orders(held_ms: u64, cycle_us: u64) -> (Vec<(f64, bool)>, Option<ArmError>) {
-        let (mut freshness, mut orders, mut followed_s) = (Freshness::default(), Vec::new(), 0.0);
+        let (mut freshness, mut orders, mut followed_s) = (Freshness::new(2e-3), Vec::new(), 0.0);
         let mut now_us = held_ms * 1000;
         while now_us < 1_000_000 {
             let newest_s = (now_us / 2000) as f64 * 2e-3;
@@ -89,7 +98,7 @@ mod tests {
 
     #[test]
     fn an_order_by_the_newest_state_is_not_sent_where_that_came_late() {
-        let mut freshness = Freshness::default();
+        let mut freshness = Freshness::new(2e-3);
         assert_eq!(freshness.may_send(3.0, (3.0, 4e-3)), Ok(true));
         assert_eq!(freshness.may_send(3.0, (3.0, 40e-3)), Ok(false));
         assert_eq!(freshness.may_send(3.1, (3.1, 40e-3)), Ok(false));
@@ -99,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_stamp_that_goes_back_holds_nothing_back() {
-        let mut freshness = Freshness::default();
+        let mut freshness = Freshness::new(2e-3);
         assert_eq!(freshness.may_send(10.0, (3.0, 0.0)), Ok(true));
         assert_eq!(freshness.may_send(f64::NAN, (3.0, 0.0)), Ok(true));
     }

@@ -12,12 +12,11 @@
 //! for [`WINDOW`]. Orders that stay away order rest, for the client brakes then.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::protocol::{Action, pose_of};
-use crate::probing::arm::ArmError;
+use super::interface::ArmError;
 
 /// An arm is at most this late.
 const WINDOW: Duration = Duration::from_millis(80);
@@ -33,7 +32,7 @@ const TURN_NOISE: f64 = 50e-3;
 const TURN_WINDOW: Duration = Duration::from_millis(300);
 /// Force mode may be faster than it is set by this factor.
 const PRESS: f64 = 1.5;
-/// Deceleration of an arm that is to zero its sensor or hears nothing, m/s²: its driver brakes so.
+/// Deceleration of an arm that has no order, or hears nothing, m/s²: its driver brakes so.
 const REST: f64 = 2.0;
 /// An order that no other follows is in force for this long: then the client brakes.
 const FRESH: Duration = Duration::from_millis(25);
@@ -42,10 +41,38 @@ const CREEP: f64 = 0.1e-3;
 /// … and does not turn by more than this, rad.
 const CREEP_TURN: f64 = 2e-3;
 
+/// What an arm is ordered to do, as far as it shows in its velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OrderedMotion {
+    /// Goes with a velocity.
+    Move {
+        /// m/s and rad/s in B
+        twist: [f64; 6],
+        /// m/s²
+        acceleration: f64,
+    },
+    /// Presses along an axis and goes across it with a velocity.
+    Press {
+        /// unit vector in B
+        axis: Vector3<f64>,
+        /// largest along the axis, m/s
+        speed: f64,
+        /// m/s in B
+        feed: Vector3<f64>,
+        /// m/s²
+        acceleration: f64,
+    },
+    /// To rest.
+    Stop {
+        /// m/s²
+        deceleration: f64,
+    },
+}
+
 /// A velocity that was ordered once.
 #[derive(Clone, Copy, Debug)]
 struct Ordered {
-    at: Instant,
+    at: Duration,
     /// m/s in B
     linear: Vector3<f64>,
     /// rad/s
@@ -56,22 +83,24 @@ struct Ordered {
 
 /// What was ordered lately.
 #[derive(Debug)]
-pub(super) struct Obedience {
+pub struct Obedience {
     /// the newest last; what it would do by now without mass and delay
     ordered: VecDeque<Ordered>,
     target: Vector3<f64>,
     /// m/s²
     acceleration: f64,
     /// when the newest order went out
-    ordered_at: Instant,
-    since: Option<Instant>,
+    ordered_at: Duration,
+    since: Option<Duration>,
     /// where it has to stay, in B
     rests_at: Option<Isometry3<f64>>,
 }
 
 impl Obedience {
     /// Of an arm at rest.
-    pub fn new(now: Instant) -> Self {
+    ///
+    /// - `now`: since some moment, as all times here.
+    pub fn new(now: Duration) -> Self {
         let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None };
         Self {
             ordered: VecDeque::from([rest]),
@@ -84,18 +113,14 @@ impl Obedience {
     }
 
     /// An order goes out.
-    pub fn order(&mut self, what: &Action, now: Instant) {
+    pub fn order(&mut self, what: &OrderedMotion, now: Duration) {
         self.follow(now);
         let (target, turn, acceleration, press) = match *what {
-            Action::Move { twist: [x, y, z, a, b, c], acceleration } => {
+            OrderedMotion::Move { twist: [x, y, z, a, b, c], acceleration } => {
                 (Vector3::new(x, y, z), Vector3::new(a, b, c).norm(), acceleration, None)
             }
-            Action::Press { frame, speed, feed, acceleration, .. } => {
-                let axis: Isometry3<f64> = pose_of(frame);
-                (Vector3::from(feed), 0.0, acceleration, Some((axis.rotation * Vector3::z(), speed)))
-            }
-            Action::Stop { deceleration } => (Vector3::zeros(), 0.0, deceleration, None),
-            Action::Zero => (Vector3::zeros(), 0.0, REST, None),
+            OrderedMotion::Press { axis, speed, feed, acceleration } => (feed, 0.0, acceleration, Some((axis, speed))),
+            OrderedMotion::Stop { deceleration } => (Vector3::zeros(), 0.0, deceleration, None),
         };
         (self.target, self.acceleration, self.ordered_at) = (target, acceleration, now);
         let linear = self.newest().linear;
@@ -108,7 +133,7 @@ impl Obedience {
     }
 
     /// The ordered velocity goes on until now, or until its order is too old.
-    fn follow(&mut self, now: Instant) {
+    fn follow(&mut self, now: Duration) {
         let stale = self.ordered_at + FRESH;
         let goes = self.target != Vector3::zeros() || self.newest().turn > 0.0 || self.newest().press.is_some();
         if goes && now > stale {
@@ -120,9 +145,9 @@ impl Obedience {
         self.go_on(now);
     }
 
-    fn go_on(&mut self, now: Instant) {
+    fn go_on(&mut self, now: Duration) {
         let last = self.newest();
-        let room = self.acceleration * now.saturating_duration_since(last.at).as_secs_f64();
+        let room = self.acceleration * now.saturating_sub(last.at).as_secs_f64();
         let linear = last.linear + (self.target - last.linear).cap_magnitude(room);
         self.push(Ordered { at: now, linear, ..last });
     }
@@ -130,21 +155,20 @@ impl Obedience {
     fn push(&mut self, ordered: Ordered) {
         self.ordered.push_back(ordered);
         // one that is older is kept: it was in force when the time began
-        while self.ordered.get(1).is_some_and(|next| ordered.at.saturating_duration_since(next.at) > TURN_WINDOW) {
+        while self.ordered.get(1).is_some_and(|next| ordered.at.saturating_sub(next.at) > TURN_WINDOW) {
             self.ordered.pop_front();
         }
     }
 
     /// A state of the arm; returns the fault of one that does not do what it is ordered to.
     ///
-    /// - `pose`: place and rotation vector in B, m and rad;
-    /// - `velocity`: m/s and rad/s in B.
-    pub fn see(&mut self, pose: [f64; 6], velocity: &[f64; 6], now: Instant) -> Option<ArmError> {
+    /// - `pose`: of the tip in B; `velocity`: m/s and rad/s in B.
+    pub fn see(&mut self, pose: &Isometry3<f64>, velocity: &[f64; 6], now: Duration) -> Option<ArmError> {
         self.follow(now);
         let [x, y, z, a, b, c] = *velocity;
         let (linear, turn) = (Vector3::new(x, y, z), Vector3::new(a, b, c).norm());
         let recent = |window| {
-            let begin = self.ordered.iter().rposition(|one| now.saturating_duration_since(one.at) > window);
+            let begin = self.ordered.iter().rposition(|one| now.saturating_sub(one.at) > window);
             self.ordered.iter().skip(begin.unwrap_or(0))
         };
         let is_ordered = recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
@@ -161,17 +185,16 @@ impl Obedience {
             return None;
         }
         let since = *self.since.get_or_insert(now);
-        (now.saturating_duration_since(since) > LASTING).then(fault)
+        (now.saturating_sub(since) > LASTING).then(fault)
     }
 
     /// Whether an arm that is to rest has left its place.
-    fn creeps(&mut self, rests: bool, pose: [f64; 6]) -> bool {
+    fn creeps(&mut self, rests: bool, pose: &Isometry3<f64>) -> bool {
         if !rests {
             self.rests_at = None;
             return false;
         }
-        let pose = pose_of(pose);
-        let rests_at = self.rests_at.get_or_insert(pose);
+        let rests_at = self.rests_at.get_or_insert(*pose);
         let way = (pose.translation.vector - rests_at.translation.vector).norm();
         way > CREEP || pose.rotation.angle_to(&rests_at.rotation) > CREEP_TURN
     }
@@ -206,29 +229,31 @@ mod tests {
         [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn go(speed: f64) -> Action {
-        Action::Move { twist: along(speed), acceleration: 0.5 }
+    fn go(speed: f64) -> OrderedMotion {
+        OrderedMotion::Move { twist: along(speed), acceleration: 0.5 }
     }
 
-    const STOP: Action = Action::Stop { deceleration: 0.5 };
+    const STOP: OrderedMotion = OrderedMotion::Stop { deceleration: 0.5 };
 
     /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow the velocity.
-    fn first_fault(ms: u32, order: impl Fn(u32) -> Action, velocity: impl Fn(u32) -> [f64; 6]) -> Option<u32> {
+    fn first_fault(ms: u32, order: impl Fn(u32) -> OrderedMotion, velocity: impl Fn(u32) -> [f64; 6]) -> Option<u32> {
         first_fault_of(ms, |at| Some(order(at)), |at| ([0.0; 6], velocity(at)))
     }
 
     /// The same with the place, and orders that may stay away.
     fn first_fault_of(
         ms: u32,
-        order: impl Fn(u32) -> Option<Action>,
+        order: impl Fn(u32) -> Option<OrderedMotion>,
         state: impl Fn(u32) -> ([f64; 6], [f64; 6]),
     ) -> Option<u32> {
-        let begun = Instant::now();
+        let begun = Duration::from_secs(3);
         let mut obedience = Obedience::new(begun);
         (0..ms).step_by(2).find(|&at| {
             let now = begun + at * MS;
             let (pose, velocity) = state(at);
-            let fault = obedience.see(pose, &velocity, now);
+            let [x, y, z, a, b, c] = pose;
+            let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::new(a, b, c));
+            let fault = obedience.see(&pose, &velocity, now);
             if let Some(order) = order(at) {
                 obedience.order(&order, now);
             }
@@ -306,7 +331,11 @@ mod tests {
         assert!(first_fault(400, |_| go(0.05), |at| along(-late(at.min(200), 0))).is_some());
         // a bend of the way by a right angle is none: it goes through what was ordered
         let bend = |at| {
-            if at < 200 { go(0.05) } else { Action::Move { twist: [0.0, 0.05, 0.0, 0.0, 0.0, 0.0], acceleration: 0.5 } }
+            if at < 200 {
+                go(0.05)
+            } else {
+                OrderedMotion::Move { twist: [0.0, 0.05, 0.0, 0.0, 0.0, 0.0], acceleration: 0.5 }
+            }
         };
         let bent = |at: u32| {
             let share = (f64::from(at.saturating_sub(220)) * 1e-3 / 0.1414).min(1.0);
@@ -321,17 +350,15 @@ mod tests {
         assert_eq!(first_fault(400, |_| STOP, turning), Some(122));
         let order = |at| {
             let turn = if at < 100 { 0.5 } else { 0.0 };
-            Action::Move { twist: [0.0, 0.0, 0.0, 0.0, 0.0, turn], acceleration: 0.5 }
+            OrderedMotion::Move { twist: [0.0, 0.0, 0.0, 0.0, 0.0, turn], acceleration: 0.5 }
         };
         let braked = |at: u32| [0.0, 0.0, 0.0, 0.0, 0.0, if at < 250 { 0.5 } else { 0.0 }];
         assert_eq!(first_fault(800, order, braked), None);
         assert!(first_fault(800, order, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]).is_some_and(|at| at < 450));
     }
 
-    /// The frame of a press whose z is along −x of B.
-    fn press(feed: [f64; 3]) -> Action {
-        let frame = [0.0, 0.0, 0.0, 0.0, -std::f64::consts::FRAC_PI_2, 0.0];
-        Action::Press { frame, force_n: 3.0, speed: 10e-3, feed, acceleration: 0.5 }
+    fn press(feed: [f64; 3]) -> OrderedMotion {
+        OrderedMotion::Press { axis: -Vector3::x(), speed: 10e-3, feed: feed.into(), acceleration: 0.5 }
     }
 
     #[test]
