@@ -1,4 +1,4 @@
-//! The arm that a verb works with: a simulated one, or a UR.
+//! The arm that a verb works with: a simulated one, a UR, or one behind ros2_control.
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +14,10 @@ use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Prober};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::arguments::NodeConfig;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
 #[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::Scene;
@@ -29,6 +33,9 @@ pub(super) enum RobotName {
     Sim,
     /// A UR, at robot.host of the scene (docs/ur.md); only where touchup was built with the feature `ur`
     Ur,
+    /// Any arm behind ros2_control, on the topics of robot.ros2_control of the scene (docs/ros2_control.md)
+    #[value(name = "ros2_control")]
+    Ros2Control,
 }
 
 /// Set where the controller is a simulation whose clock waits for its client: docs/ur.md.
@@ -86,6 +93,63 @@ pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliErro
 #[cfg(not(feature = "ur"))]
 const NO_UR: &str = "this touchup was built without a UR: `cargo install --locked --path . --features ur` in its folder makes one with \
                      it, which needs a Python with its shared library (docs/ur.md)";
+
+/// The arm behind ros2_control of a scene, on the network of the environment.
+///
+/// # Errors
+/// [`CliError::usage`] where the scene names no arm, or touchup was built without ROS; [`CliError::arm`] where it is not at command.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+fn connect_ros2_control(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    let config = NodeConfig::named("touchup_arm", &[], |name| std::env::var(name).ok())?;
+    ros2_control_arm(scene, &config)
+}
+
+#[cfg(not(any(feature = "ros", feature = "r2r")))]
+fn connect_ros2_control(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
+    Err(CliError::usage("this touchup was built without ROS: build it with the feature `ros`, its default"))
+}
+
+/// The arm behind ros2_control of a scene.
+///
+/// # Errors
+/// [`CliError::usage`] where the scene names no arm; [`CliError::arm`] where it is not at command.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+pub(super) fn ros2_control_arm(scene: &Scene, config: &NodeConfig) -> Result<Box<dyn Arm + Send>, CliError> {
+    const NONE: &str =
+        "an arm behind ros2_control needs the sections robot and tip in the scene (docs/ros2_control.md)";
+    let of_scene = scene.robot.as_ref().zip(scene.probing());
+    let (robot, (cell, params)) = of_scene.ok_or_else(|| CliError::usage(NONE))?;
+    let control = robot.ros2_control.clone().unwrap_or_default();
+    let joint_names = match &robot.chain {
+        Some(chain) => chain.joints().iter().map(|joint| joint.name.clone()).collect(),
+        None => UR_JOINTS.map(Into::into).into(),
+    };
+    let params = Ros2ControlParams {
+        geometry: cell.geometry,
+        joint_names,
+        pose_ft: cell.pose_ft,
+        pose_fs: control.pose_fs(),
+        payload: Payload { mass: robot.payload_mass, p_sc: robot.payload_centre, ..WEIGHTLESS },
+        stiffness: params.touch.stiffness,
+        latency: params.touch.latency,
+        top_joint_speed: params.limits.joint_speed,
+        wrench_frame: control.wrench_frame,
+        topics: ArmTopics {
+            joint_states: control.joint_states_topic,
+            wrench: control.wrench_topic,
+            trajectory: control.trajectory_topic,
+        },
+        ..Ros2ControlParams::default()
+    };
+    let ArmTopics { joint_states, wrench, trajectory } = &params.topics;
+    let port = crate::ros::arm_port(config, [joint_states, wrench], trajectory).map_err(CliError::arm)?;
+    Ok(Box::new(Ros2ControlArm::connect(&params, port).map_err(CliError::arm)?))
+}
+
+/// Of a UR from the base to the wrist, as its description names them.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+const UR_JOINTS: [&str; 6] =
+    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
 
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
@@ -183,6 +247,7 @@ impl CellArguments {
     ) -> Result<T, CliError> {
         match robot {
             RobotName::Ur => work(&mut *connect_ur(&ready.scene)?),
+            RobotName::Ros2Control => work(&mut *connect_ros2_control(&ready.scene)?),
             RobotName::Sim => {
                 let part = self.part()?;
                 let surface = MeshSurface::new(&part)?;

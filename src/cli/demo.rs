@@ -70,7 +70,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     match arguments.robot {
         None => {}
         Some(RobotName::Sim) => return demo_robot(&arguments.out, arguments.seed),
-        Some(RobotName::Ur) => return Err(CliError::usage("the demo has a simulated arm: --robot sim")),
+        Some(_) => return Err(CliError::usage("the demo has a simulated arm: --robot sim")),
     }
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default())?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::arm::connect_ur;
+use super::arm::{connect_ur, ros2_control_arm};
 use super::signals::{SignalKind, on_each_signal};
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require};
 use crate::clock::Clock;
@@ -72,6 +72,7 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
             let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::truth)?;
             ArmKind::Sim(Box::new(mesh))
         }
+        "ros2_control" => ArmKind::Real(ros2_control_arm(scene, &config.beside("_driver"))?),
         _ => ArmKind::Real(connect_ur(scene)?),
     };
     Ok(Some(ArmOfNode { kind, samples: ros::samples(&config.beside("_arm"))? }))

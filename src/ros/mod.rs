@@ -24,7 +24,7 @@ pub mod stop;
 mod topics;
 
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
-pub use dds::{samples, start};
+pub use dds::{arm_port, samples, start};
 pub use exchange::RosError;
 
 /// Locks it. What is in it is whole whoever held it: nothing of ours panics while it does.
@@ -32,4 +32,4 @@ fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 #[cfg(all(feature = "r2r", not(all(feature = "ros", feature = "r2r-check"))))]
-pub use r2r::{samples, start};
+pub use r2r::{arm_port, samples, start};

@@ -134,7 +134,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         live("stale_ms", Double(100.0, 1.0, 10_000.0), "a stream without a message for so long is stale"),
         live("flag_kind", OneOf("hole", &KIND_NAMES), "what a clicked point flags"),
         live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
-        fixed("robot", OneOf("none", &["none", "sim", "ur"]), "the arm"),
+        fixed("robot", OneOf("none", &["none", "sim", "ur", "ros2_control"]), "the arm"),
         fixed("sim_part", String(""), "the part as it is, which a simulated arm touches"),
         ParameterDescriptor {
             name: "allow_motion",

@@ -202,3 +202,26 @@ pub trait SamplePort: Send {
     /// How many listen now: to wrenches, to poses.
     fn listeners(&mut self) -> [usize; 2];
 }
+
+/// Something that came from an arm behind ros2_control.
+#[derive(Clone, Debug)]
+pub enum ArmReport {
+    /// its joints
+    Joints(JointState),
+    /// its sensor
+    Wrench(WrenchStamped),
+    /// a message that could not be read: why
+    Unreadable(String),
+}
+
+/// Where an arm behind ros2_control is spoken to: two topics in, one out.
+pub trait ArmPort: Send {
+    /// The next message, as soon as one is there; `None`: none came in this time.
+    fn next_report(&mut self, timeout: std::time::Duration) -> Option<ArmReport>;
+
+    /// Sends an order, reliably; whether it was sent.
+    fn publish_trajectory(&mut self, order: JointTrajectory) -> bool;
+
+    /// How many listen to orders now; `None` where the port does not know.
+    fn order_listeners(&mut self) -> Option<usize>;
+}

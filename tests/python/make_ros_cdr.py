@@ -26,6 +26,9 @@ STANDARD = [
     "rosgraph_msgs/msg/Clock",
     "nav_msgs/msg/Path",
     "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/JointState",
+    "trajectory_msgs/msg/JointTrajectory",
+    "trajectory_msgs/msg/JointTrajectoryPoint",
 ]
 # std_srvs and rcl_interfaces as in their files; an empty request has one byte
 SERVICES = {

@@ -36,10 +36,11 @@ const MAY_USE: &[(&str, &str)] = &[
         "parameters clock stylus mesh reconstruct haptic live features plan arm execute sim align calibrate \
          compare io scene session",
     ),
+    ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare io \
-         scene session replay ros ur",
+         scene session replay ros ros2_control ur",
     ),
 ];
 

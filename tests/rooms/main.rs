@@ -33,6 +33,8 @@ mod probing;
 mod reconstruct;
 #[cfg(feature = "ros")]
 mod ros;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod ros2_control;
 mod scene;
 mod sim;
 mod stylus;

@@ -58,7 +58,7 @@ fn the_scene_of_the_demo_is_the_default_with_a_scan() {
 #[test]
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
-    let inner = ["compensation.payload", "compensation.bias"];
+    let inner = ["compensation.payload", "compensation.bias", "robot.ros2_control"];
     let outer = [
         "",
         "sync",

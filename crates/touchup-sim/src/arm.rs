@@ -240,6 +240,11 @@ impl<'a> SimArm<'a> {
         self.time
     }
 
+    /// Its joints now.
+    pub fn joints(&self) -> Joints {
+        self.joints
+    }
+
     /// Since when it is at rest, s.
     pub fn at_rest_since(&self) -> f64 {
         self.moved_at
@@ -258,6 +263,36 @@ impl<'a> SimArm<'a> {
     /// Lets time go by without anybody asking.
     pub fn advance(&mut self, seconds: f64) {
         (0..(seconds / PERIOD).round() as usize).for_each(|_| self.tick());
+    }
+
+    /// Has its joints turn to others within one period, as the drives of somebody else's controller do, whatever it was commanded;
+    /// returns the state that this ends in, without the noise of its place.
+    ///
+    /// - `joints`: near those of now.
+    ///
+    /// # Panics
+    /// For another number of joints than it has.
+    pub fn drive(&mut self, joints: &Joints) -> ArmState {
+        self.begin_faults();
+        let begin = self.nominal;
+        let end = self.params.geometry.flange(joints) * self.params.pose_ft;
+        self.velocity = (end.translation.vector - begin.translation.vector) / PERIOD;
+        let turn = (end.rotation * begin.rotation.inverse()).scaled_axis();
+        for step in 1..=STEPS {
+            self.time += STEP;
+            if *joints != self.joints {
+                self.moved_at = self.time;
+            }
+            let share = step as f64 / STEPS as f64;
+            self.nominal.translation.vector += self.velocity * STEP;
+            self.nominal.rotation = UnitQuaternion::new(turn * share) * begin.rotation;
+            self.bend();
+        }
+        self.spike = self.spike.saturating_sub(1);
+        (self.nominal, self.joints) = (end, *joints);
+        self.kinematic = kinematic_error(&self.geometry, &self.params, &self.joints);
+        let raw_wrench_f = self.read();
+        self.state(self.nominal, raw_wrench_f)
     }
 
     fn tick(&mut self) {
@@ -427,6 +462,14 @@ impl<'a> SimArm<'a> {
         raw.force - r_bf.inverse() * self.params.configured_payload.weight_o(&r_bf).force
     }
 
+    fn state(&mut self, pose_bt: Isometry3<f64>, raw_wrench_f: Wrench) -> ArmState {
+        let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
+        let stamp_ns = if self.is_killed { self.last_stamp_ns } else { (self.time * 1e9).round() as i64 };
+        self.last_stamp_ns = stamp_ns;
+        let wrench_b = Wrench { force, torque: Vector3::zeros() };
+        ArmState { stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints: self.joints, safety: self.safety }
+    }
+
     /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.
     fn follow_joints(&mut self) {
         let flange = self.nominal * self.params.pose_ft.inverse();
@@ -457,14 +500,10 @@ impl Arm for SimArm<'_> {
         self.check_link(PERIOD)?;
         self.follow_joints();
         let raw_wrench_f = self.read();
-        let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
         let noise = gauss_vector(&mut self.rng) * self.params.pose_noise;
         let mut pose_bt = self.nominal;
         pose_bt.translation.vector += noise;
-        let stamp_ns = if self.is_killed { self.last_stamp_ns } else { (self.time * 1e9).round() as i64 };
-        self.last_stamp_ns = stamp_ns;
-        let wrench_b = Wrench { force, torque: Vector3::zeros() };
-        Ok(ArmState { stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints: self.joints, safety: self.safety })
+        Ok(self.state(pose_bt, raw_wrench_f))
     }
 
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {

@@ -57,7 +57,7 @@ impl Bounds {
 /// A surface that is known exactly, with material behind it.
 ///
 /// The distance of a point that is not finite is NaN, and so is its closest point.
-pub trait Surface {
+pub trait Surface: Sync {
     /// Distance to the surface, m; positive outside the material, negative inside.
     fn signed_distance(&self, p: &Point3<f64>) -> f64;
 

@@ -5,6 +5,7 @@
 
 mod action;
 mod answers;
+mod arm_port;
 mod back_end;
 mod graph;
 mod incoming;
@@ -29,6 +30,7 @@ use super::parameter_services::{self, PublicParameters};
 use super::parameters::{PARAMETERS, ParameterValue, Parameters};
 use super::port::Port;
 use super::topics::{mesh, subscribe, urgent};
+pub use arm_port::arm_port;
 pub use samples::samples;
 
 struct DdsConnection {

@@ -16,7 +16,8 @@ use crate::ros::topics::{MESH, MESH_PATCH, PROBE_TOUCHES, Publisher, Publishes, 
 
 pub(super) const BEST_EFFORT: QosProfile = QosProfile::subscription_default();
 /// The thread that sends what is urgent is not held up by who does not listen for longer than this.
-const URGENT: QosProfile = BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(10)));
+pub(super) const URGENT: QosProfile =
+    BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(10)));
 /// The mesh waits for who listens slowly, then tries again.
 const PATIENT: QosProfile = BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(100)));
 

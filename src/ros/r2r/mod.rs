@@ -5,6 +5,7 @@
 //! reads the command line and the environment by itself, so names go to it as the node has them, not yet remapped.
 
 mod action;
+mod arm_port;
 mod back_end;
 mod convert;
 mod graph;
@@ -33,6 +34,7 @@ use super::parameter_services::{self, PublicParameters, raw};
 use super::parameters::ParameterValue;
 use super::port::{Arrival, Port};
 use super::topics::{mesh, subscribe, urgent};
+pub use arm_port::arm_port;
 use back_end::{During, PollSource, R2rBackEnd};
 use convert::Convert;
 use graph::R2rGraph;

@@ -3,3 +3,6 @@
 mod arm;
 mod execute;
 mod plan;
+
+#[cfg(any(feature = "ros", feature = "r2r"))]
+pub use execute::StaticScan;

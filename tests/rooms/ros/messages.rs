@@ -47,7 +47,7 @@ fn every_message_is_on_the_wire_as_rosbags_has_it() {
     check_all!(
         Time Duration Header ColorRGBA Point Vector3 Quaternion Pose Transform Wrench PointStamped PoseStamped
         WrenchStamped TransformStamped KeyValue DiagnosticStatus DiagnosticArray UVCoordinate MeshFile Marker MarkerArray
-        TFMessage Clock Path CompressedImage
+        TFMessage Clock Path CompressedImage JointState JointTrajectoryPoint JointTrajectory
         FloatingPointRange IntegerRange ListParametersResult Parameter ParameterDescriptor ParameterEvent ParameterValue
         SetParametersResult GetParametersRequest GetParametersResponse GetParameterTypesRequest GetParameterTypesResponse
         ListParametersRequest ListParametersResponse DescribeParametersRequest DescribeParametersResponse

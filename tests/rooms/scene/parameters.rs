@@ -63,6 +63,8 @@ uncertainty.stiffness_percent % 2 0 100
 uncertainty.gate_sigmas deviations 4 0.5 1e6
 robot.payload_kg kg 0.25 0 50
 robot.payload_centre_mm mm [0,0,50] -1000 1000
+robot.ros2_control.sensor_position_mm mm [0,0,0] -1000 1000
+robot.ros2_control.sensor_orientation_xyzw length [0,0,0,1] 0.999 1.001
 robot.tip_position_mm mm [0,0,150] -2000 2000
 robot.tip_orientation_xyzw length [1,0,0,0] 0.999 1.001
 robot.workspace_low_mm mm [0,0,0] -5000 5000
@@ -122,6 +124,10 @@ scan.unit mm m,mm,inch
 robot.model ur5e ur3e,ur5e,ur10e,ur16e,urdf
 robot.urdf - -
 robot.check - -
+robot.ros2_control.joint_states_topic '/joint_states' -
+robot.ros2_control.wrench_topic '/force_torque_sensor_broadcaster/wrench' -
+robot.ros2_control.trajectory_topic '/joint_trajectory_controller/joint_trajectory' -
+robot.ros2_control.wrench_frame 'tool0' -
 robot.base_link 'base_link' -
 robot.flange_link 'tool0' -
 robot.allow_motion false -

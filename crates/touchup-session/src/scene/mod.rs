@@ -24,7 +24,7 @@ pub use params::simulated_arm;
 pub use region::{CutScan, RegionCut};
 pub use sections::{
     ArmModel, ClockSection, CompensationSection, GravityAxes, MarkersSection, Mode, ModelName, PayloadSection,
-    RefineSection, RobotSection, ScanSection, ScanToSpaceSection, ShapeName, TipSection,
+    RefineSection, RobotSection, Ros2ControlSection, ScanSection, ScanToSpaceSection, ShapeName, TipSection,
 };
 
 use touchup_core::haptic::{CarveParams, GuardParams, SlidingParams};

@@ -275,6 +275,34 @@ words! {
 }
 
 parameters! {
+    /// `robot.ros2_control`
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct Ros2ControlSection in "robot.ros2_control" {
+        /// Topic of joint_state_broadcaster.
+        joint_states_topic: String = "/joint_states".to_owned(), "joint_states_topic";
+        /// Topic of force_torque_sensor_broadcaster.
+        wrench_topic: String = "/force_torque_sensor_broadcaster/wrench".to_owned(), "wrench_topic";
+        /// Topic on which joint_trajectory_controller takes orders.
+        trajectory_topic: String = "/joint_trajectory_controller/joint_trajectory".to_owned(), "trajectory_topic";
+        /// The frame that its wrenches name.
+        wrench_frame: String = "tool0".to_owned(), "wrench_frame";
+        /// Origin of that frame in the flange.
+        ///
+        /// m.
+        sensor_position: Vector3<f64> = [0.0; 3], "sensor_position_mm" [MM, -1000, 1000];
+        /// Axes of that frame in the flange, as a quaternion x, y, z, w.
+        sensor_orientation_xyzw: [f64; 4] = NO_TURN, "sensor_orientation_xyzw" [QUATERNION, 0.999, 1.001];
+    }
+}
+
+impl Ros2ControlSection {
+    /// Pose of the sensor in the flange.
+    pub fn pose_fs(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(self.sensor_position.into(), unit_quaternion(self.sensor_orientation_xyzw))
+    }
+}
+
+parameters! {
     /// `robot`: pose of its base, its payload, and the volume that it must never leave.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RobotSection in "robot" {
@@ -310,6 +338,8 @@ parameters! {
         host: String = String::new(), "host";
         /// The folder that `touchup ur setup` prints (docs/ur.md); a simulated arm has none.
         site_packages: String = String::new(), "site_packages";
+        /// Topics and sensor of an arm behind ros2_control (docs/ros2_control.md).
+        ros2_control: Option<Ros2ControlSection> = None, "ros2_control";
         /// Mass of all that hangs on the flange (`touchup calibrate payload --robot`).
         payload_mass: f64 = 0.25, "payload_kg" [KG, 0, 50];
         /// Its centre of mass in the flange.

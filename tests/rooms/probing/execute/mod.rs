@@ -4,6 +4,9 @@ mod planning;
 mod sliding;
 mod uncertainty;
 
+#[cfg(any(feature = "ros", feature = "r2r"))]
+pub use planning::StaticScan;
+
 use nalgebra::Point3;
 use touchup::probing::arm::{Limits, TouchParams};
 use touchup::probing::execute::{Cell, ProbeParams, Tool};

@@ -23,7 +23,7 @@ use crate::chains::seven_joints;
 use crate::plate_stream::plate_scan;
 
 /// A mesh that stays unchanged.
-struct StaticScan {
+pub struct StaticScan {
     mesh: TriMesh,
     tree: FaceTree,
     /// cancels after this many states
@@ -42,7 +42,7 @@ struct StaticScan {
 }
 
 impl StaticScan {
-    fn new(mesh: TriMesh) -> Self {
+    pub fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
         let (patience, stays_after, stayed_ns) = (None, None, 0);
         let (seen, touches, made, after, since_then) = (0, Vec::new(), Vec::new(), None, None);
