@@ -159,7 +159,7 @@ impl World {
 
     fn period(&mut self) {
         let now_ns = self.now_ns;
-        while let Some((_, order)) = self.orders.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
+        while let Some(order) = due(&mut self.orders, now_ns) {
             if !(self.has(Fault::Inactive) || self.has(Fault::Dead) || self.has(Fault::RunsOn)) {
                 self.take(&order);
             }
@@ -288,7 +288,7 @@ impl ArmPort for StandIn {
         let end_ns = world.now_ns + timeout.as_nanos() as i64;
         loop {
             let now_ns = world.now_ns;
-            if let Some((_, report)) = world.reports.pop_front_if(|(due_ns, _)| *due_ns <= now_ns) {
+            if let Some(report) = due(&mut world.reports, now_ns) {
                 return Some(report);
             }
             if now_ns >= end_ns {
@@ -308,6 +308,12 @@ impl ArmPort for StandIn {
     fn order_listeners(&mut self) -> Option<usize> {
         Some(usize::from(!self.world().has(Fault::Inactive)))
     }
+}
+
+/// The first of a queue, where its time has come.
+fn due<T>(queue: &mut VecDeque<(i64, T)>, now_ns: i64) -> Option<T> {
+    queue.front().filter(|(due_ns, _)| *due_ns <= now_ns)?;
+    queue.pop_front().map(|(_, item)| item)
 }
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
