@@ -260,7 +260,7 @@ impl ApproachLine<'_> {
         let hard: Vector3<f64> =
             states.iter().filter(|state| norm(state) > 0.5 * most).map(|state| state.wrench_b.force).sum();
         let pushes = hard.try_normalize(0.0).unwrap_or(back);
-        if pushes.dot(&back) * ASIDE < 1.0 { pushes } else { back }
+        if pushes.dot(&back) < FLAT { pushes } else { back }
     }
 
     /// The outcome of a curve that reached the wanted force.
@@ -286,6 +286,8 @@ impl ApproachLine<'_> {
 /// A ball is stopped as well when its whole force is more than this many times the limit along its direction: a wall that it
 /// meets at 45° pushes √2 times as much.
 const ASIDE: f64 = 1.42;
+/// A wall whose push is more than 33° from the approach is met at a flat angle (cosine).
+const FLAT: f64 = 0.8387;
 /// A contact that pulls by more than this share of its force has the wrong sign.
 const PULLS: f64 = 0.7;
 /// Where the surface is known to so many standard deviations it is not searched first …
