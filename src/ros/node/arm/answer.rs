@@ -193,10 +193,10 @@ fn stopped(error: &ProbeError) -> u8 {
         },
         ProbeError::Limit { error: LimitError::Force { .. }, .. } => ProbeResult::FORCE_OVER_LIMIT,
         ProbeError::Limit { .. } => ProbeResult::LIMIT_OVERRUN,
-        ProbeError::Obstacle { is_link: true, .. } => ProbeResult::UNEXPECTED_CONTACT,
-        ProbeError::Obstacle { .. } => ProbeResult::EARLY_CONTACT,
         ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
-        ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => ProbeResult::UNEXPECTED_CONTACT,
+        ProbeError::Obstacle { .. } | ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => {
+            ProbeResult::UNEXPECTED_CONTACT
+        }
         ProbeError::TooLong { .. } | ProbeError::Pulls { .. } => ProbeResult::FAULT,
         ProbeError::Cancelled { request, .. } => cancelled(*request),
     }

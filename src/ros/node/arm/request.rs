@@ -59,7 +59,7 @@ impl Wanted {
             return Err(bad(format!("a {kind} has no {}", params.pattern.quantity.name())));
         }
         match settings.pattern {
-            ProbeSettings::PATTERN_PLANNED | ProbeSettings::PATTERN_TOUCHES => {}
+            ProbeSettings::PATTERN_TOUCHES => {}
             ProbeSettings::PATTERN_SLIDE => params.slides = true,
             other => return Err(bad(format!("there is no pattern {other}"))),
         }
