@@ -2,7 +2,9 @@
 
 mod arm;
 mod execute;
+mod grid;
 mod plan;
+mod pockets;
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub use execute::StaticScan;

@@ -19,7 +19,7 @@ use touchup::sim::{Plate, Surface as _};
 
 use crate::plate_stream::plate_scan;
 
-const SIGMA: f64 = 5e-6;
+pub(super) const SIGMA: f64 = 5e-6;
 
 fn hole() -> Cylinder {
     Cylinder::new(Point3::new(16e-3, 36e-3, 6e-3), &Vector3::z(), 4e-3, true)
@@ -149,7 +149,7 @@ struct Case<M> {
 const LEAN: f64 = 0.02;
 
 /// Outward normal at a point, by differences of the distance.
-fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
+pub(super) fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
     let step = 1e-6;
     let by =
         |direction: Vector3<f64>| surface.distance(&(p + direction * step)) - surface.distance(&(p - direction * step));
@@ -157,7 +157,7 @@ fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
 }
 
 /// The place of a surface that is nearest to a point near it.
-fn on<M: Surface>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
+pub(super) fn on<M: Surface>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
     (0..4).fold(*p, |p, _| p - normal_of(surface, &p) * surface.distance(&p))
 }
 
@@ -380,7 +380,7 @@ fn planned_touches_beat_a_uniform_grid() {
 
 /// Contact of a ball that is let down and then moved in a straight line until it meets the material, exactly, with noise along
 /// its path; a path that is blocked before measures nothing.
-fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
+pub(super) fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
     // the distance changes no faster than the place
     let free = |from: &Point3<f64>, direction: &Vector3<f64>, length: f64| {
         let mut gone = 0.0;
@@ -423,7 +423,7 @@ fn explored(
 }
 
 /// Top of the plate of the demo, m.
-const TOP: f64 = 12e-3;
+pub(super) const TOP: f64 = 12e-3;
 /// Middle of its slot: 20 × 6 mm along x, 5 mm deep.
 const SLOT: Point3<f64> = Point3::new(25e-3, 14e-3, TOP);
 
@@ -546,7 +546,7 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
 }
 
 /// The top of a scan that has lost all openings: a rectangle at the height of the plate, mm.
-fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
+pub(super) fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
     let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
     let corners = corners.map(|[x, y]| Point3::new(x * 1e-3, y * 1e-3, TOP));
     TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()

@@ -165,7 +165,8 @@ impl Explorer {
         let is_as_asked = match &self.ended {
             Some(Err(error)) => return Err(error.clone()),
             Some(Ok(is_as_asked)) => *is_as_asked,
-            None => false,
+            // the last touch that may be made was enough
+            None => self.context.touches >= self.context.params.budget && self.stage.is_known(&self.context),
         };
         let over = self.uncertainty().map(|sigma| sigma / self.wanted);
         let limited = over.filter(|over| is_as_asked && *over > 1.0 + ROUNDING);

@@ -5,6 +5,9 @@
 //! 3. Down beside it: the plane of its opening. A long path sideways stays at its depth only from here on.
 //! 4. Along it to both ends, then down to its floor.
 //! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the largest gain.
+//!
+//! Whether its ends are round or straight is what the contacts agree with. Corners of a slot with straight ends are not touched, and what
+//! was touched there before it was known does not count.
 
 use std::f64::consts::PI;
 
@@ -19,8 +22,8 @@ use super::pattern::{Stage, Touched};
 use super::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
 use super::search_context::{AROUND, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::{RimStation, Slide, stadium_rim};
-use super::slot_fit::SlotFit;
-use crate::features::fit::{Ends, Freedom, Stadium, Surface, fit};
+use super::slot_fit::{CORNER, SlotFit};
+use crate::features::fit::{Ends, Freedom, Observation, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
 /// First directions: five numbers are unknown.
@@ -40,6 +43,12 @@ const BEYOND: f64 = 3e-3;
 /// An end is believed when it was touched on its middle and on both sides of it: angles from the slot's direction, rad. One touch
 /// alone may have met anything; three that lie on one half circle as wide as the slot have met its end.
 const PARTS: [[f64; 2]; 3] = [[-PI / 3.0, -PI / 8.0], [-PI / 8.0, PI / 8.0], [PI / 8.0, PI / 3.0]];
+/// The same parts of a straight end: across the slot, over the distance of the ball's centre from the middle line.
+const STRAIGHT_PARTS: [[f64; 2]; 3] = [[-0.5, -0.15], [-0.15, 0.15], [0.15, 0.5]];
+/// So far from the middle of a wall candidates go at the most, over where its corners begin: they are met a little elsewhere.
+const OFF_CORNER: f64 = 0.85;
+/// Walls agree with contacts that are this far off, rms, over the standard deviation of a touch.
+const AGREES: f64 = 2.0;
 /// Walls may be this much nearer than where the ball went freely, m.
 const SLACK: f64 = 0.2e-3;
 /// A ball that sank by less than this lay on the surface, m …
@@ -66,6 +75,8 @@ pub(super) struct SlotPattern {
     /// where the ball fell in, in F
     middle: Point3<f64>,
     measuring: Measuring,
+    /// contacts in the corners of a slot with straight ends
+    corners: Vec<Observation>,
     /// as far as it is known, in F and in O
     slot_fit: Option<SlotFit>,
     walls: Option<Stadium>,
@@ -87,20 +98,30 @@ impl SlotPattern {
 
     /// The walls through the contacts, at the height of the surface, so that depths are coordinates of their frame.
     fn renew(&mut self, context: &SearchContext) {
+        let corners = std::mem::take(&mut self.corners);
+        self.measuring.observations.extend(corners);
+        self.measuring.observations.sort_by_key(|o| o.group);
         let flat: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point).xy()).collect();
         let free: Vec<_> = self.free.iter().map(|place| context.in_f(place).xy()).collect();
+        let agrees = AGREES * context.params.touch_sigma;
         self.slot_fit = match self.slot_fit {
-            Some(known) if self.phase == SlotPhase::Wall => Some(known.fitted(&flat)),
+            Some(known) if self.phase == SlotPhase::Wall => Some(known.fitted_to_more(&flat, &free, agrees)),
             // the first guess of its length may be far off
-            known => SlotFit::through(&flat, &free, &self.middle.xy())
+            known => SlotFit::through(&flat, &free, &self.middle.xy(), agrees)
                 .map(|slot_fit| known.map_or(slot_fit, |known| slot_fit.along_as(&known))),
         };
-        self.walls = self.slot_fit.map(|slot_fit| {
-            let centre = context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
-            let along = context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
-            let width = 2.0 * (slot_fit.radius + context.params.ball_radius);
-            Stadium::new(centre, &context.out(), &along, [width, width + 2.0 * slot_fit.half], Ends::Round, true)
-        });
+        let observations = std::mem::take(&mut self.measuring.observations);
+        let is_in_corner =
+            |o: &Observation| self.slot_fit.is_some_and(|fit| fit.is_in_corner(&context.in_f(&o.point).xy()));
+        (self.corners, self.measuring.observations) = observations.into_iter().partition(is_in_corner);
+        self.walls = self.slot_fit.map(|slot_fit| Self::walls_of(context, &slot_fit));
+    }
+
+    fn walls_of(context: &SearchContext, slot_fit: &SlotFit) -> Stadium {
+        let centre = context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
+        let along = context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
+        let width = 2.0 * (slot_fit.radius + context.params.ball_radius);
+        Stadium::new(centre, &context.out(), &along, [width, width + 2.0 * slot_fit.half], slot_fit.ends, true)
     }
 
     fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
@@ -130,18 +151,24 @@ impl SlotPattern {
     /// The part of an end that was not touched yet: the sign of the end along the slot, and its angles. Touches that the fit holds
     /// for none of these walls do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
-        let half = (walls.length - walls.width).max(0.0) / 2.0;
+        let (half, ball) = ((walls.length - walls.width).max(0.0) / 2.0, context.params.ball_radius);
         let (_, params) = context.squareness(walls, &self.measuring.observations);
         let fitted = fit(walls, &self.measuring.observations, &params).ok();
         let used = fitted.iter().flat_map(|fitted| &fitted.used);
         let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
         let kept: Vec<_> = kept.map(|(o, _)| walls.pose_of.inverse_transform_point(&o.point)).collect();
         let is_touched = |sign: f64, [low, high]: [f64; 2]| {
-            let angle = |q: &Point3<f64>| q.y.atan2(sign * q.x - half);
-            kept.iter().any(|q| sign * q.x > half && (low..=high).contains(&angle(q)))
+            kept.iter().any(|q| match walls.ends {
+                Ends::Round => sign * q.x > half && (low..=high).contains(&q.y.atan2(sign * q.x - half)),
+                Ends::Straight => {
+                    let is_of_end = walls.length / 2.0 - sign * q.x < walls.width / 2.0 - q.y.abs();
+                    is_of_end && (low..=high).contains(&(q.y / (walls.width / 2.0 - ball)))
+                }
+            })
         };
         // the middle of an end first: it says where its sides are
-        let parts = [1, 0, 2].map(|part| PARTS[part]);
+        let parts = if walls.ends == Ends::Round { PARTS } else { STRAIGHT_PARTS };
+        let parts = [1, 0, 2].map(|part| parts[part]);
         let all = [1.0, -1.0].into_iter().flat_map(|sign| parts.map(|part| (sign, part)));
         all.into_iter().find(|(sign, part)| !is_touched(*sign, *part))
     }
@@ -157,6 +184,9 @@ impl SlotPattern {
 
     /// Touches of walls and ends, each from the middle line of the slot; of one part of an end alone where that is open.
     fn possible(&self, context: &SearchContext, walls: &Stadium, part: Option<(f64, [f64; 2])>) -> Vec<Possible> {
+        if walls.ends == Ends::Straight {
+            return self.possible_straight(context, walls, part);
+        }
         let (half, radius) = ((walls.length - walls.width).max(0.0) / 2.0, walls.width / 2.0);
         let travel = radius - context.params.ball_radius;
         let is_wanted = |&(x, angle): &(f64, f64)| {
@@ -166,12 +196,46 @@ impl SlotPattern {
             })
         };
         let places = around_stadium(half, ALONG).filter(is_wanted);
+        let places = places.map(|(x, angle)| (Point3::new(x, 0.0, 0.0), Vector3::new(angle.cos(), angle.sin(), 0.0)));
+        self.sideways_from(context, walls, places, radius, travel)
+    }
+
+    /// The same with straight ends: across from the middle line, and along it from half a width before the end, away from the corners.
+    fn possible_straight(
+        &self,
+        context: &SearchContext,
+        walls: &Stadium,
+        part: Option<(f64, [f64; 2])>,
+    ) -> Vec<Possible> {
+        let (ball, radius, half) = (context.params.ball_radius, walls.width / 2.0, (walls.length - walls.width) / 2.0);
+        let room = radius - ball;
+        let flat = OFF_CORNER * (1.0 - CORNER);
+        let along = half + room * flat;
+        let sides = (0..ALONG).flat_map(|at| {
+            [-1.0, 1.0].map(|sign| (Point3::new(spread(at, ALONG) * along, 0.0, 0.0), Vector3::y() * sign))
+        });
+        let ends = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|sign| (spread(at, ALONG) * flat, sign)));
+        let in_part = |&(y, sign): &(f64, f64)| {
+            part.is_none_or(|(wanted, [low, high])| sign == wanted && (low..=high).contains(&y))
+        };
+        let ends = ends.filter(in_part).map(|(y, sign)| (Point3::new(sign * half, y * room, 0.0), Vector3::x() * sign));
+        self.sideways_from(context, walls, sides.filter(|_| part.is_none()).chain(ends), radius, room)
+    }
+
+    /// Touches from places of the middle plane of the walls along directions of it, at both depths.
+    fn sideways_from(
+        &self,
+        context: &SearchContext,
+        walls: &Stadium,
+        places: impl Iterator<Item = (Point3<f64>, Vector3<f64>)>,
+        radius: f64,
+        travel: f64,
+    ) -> Vec<Possible> {
         let depths = [BELOW_RIM * context.params.ball_radius, self.depth];
-        let planned = |(x, angle): (f64, f64), depth: f64| {
-            let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
-            let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
-            let from = context.in_f(&(walls.pose_of * Point3::new(x, 0.0, 0.0)));
-            let point = walls.pose_of * (Point3::new(x, 0.0, -depth) + direction * radius);
+        let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
+        let planned = |(place, direction): (Point3<f64>, Vector3<f64>), depth: f64| {
+            let from = context.in_f(&(walls.pose_of * place));
+            let point = walls.pose_of * (place - Vector3::z() * depth + direction * radius);
             Possible { point, travel, planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND) }
         };
         context.on_part(places.flat_map(|place| depths.map(|depth| planned(place, depth))))
@@ -184,7 +248,7 @@ impl SlotPattern {
             self.unclear += 1;
         }
         // one unclear touch may have been anything
-        if self.measuring.observations.is_empty() && self.unclear >= SLID_IN {
+        if self.measuring.observations.is_empty() && self.corners.is_empty() && self.unclear >= SLID_IN {
             self.opening.slid_in(self.middle, context);
             (self.phase, self.tried, self.unclear) = (SlotPhase::Opening, 0, 0);
             return;
@@ -276,7 +340,7 @@ impl Stage for SlotPattern {
             }
             _ => {}
         }
-        let touched = self.measuring.observations.len();
+        let touched = self.measuring.observations.len() + self.corners.len();
         let walls = self.walls.filter(|_| touched >= LEAST_FIRST);
         let no_wall = ExploreError::NoWall { kind: "slot", walls: touched, asked: FIRST, reach_mm: REACH * 1e3 };
         let walls = walls.ok_or(no_wall)?;
@@ -352,7 +416,7 @@ impl Stage for SlotPattern {
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Some(walls) = &self.walls else { return Vec::new() };
+        let Some(walls) = self.walls.as_ref().filter(|walls| walls.ends == Ends::Round) else { return Vec::new() };
         let ball = context.params.ball_radius;
         let (length, rim) = stadium_rim(walls.width, walls.length);
         let to_f = context.pose_of.inverse() * walls.pose_of;

@@ -1,11 +1,14 @@
-//! The slot through few touches: where the ball's centre was stopped lies at one distance from a segment.
+//! The slot through few touches: where the ball's centre was stopped lies at one distance from a segment, or on a rectangle where its ends
+//! are straight.
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 
-use crate::features::fit::from_segment;
+use crate::features::fit::{Ends, from_segment};
 use crate::numeric::{DampedSearch, NormalEquations};
 
-/// All points at a distance from a segment of a plane.
+/// All points at a distance from a segment of a plane; with straight ends the rectangle around them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SlotFit {
     /// of the segment, m
@@ -16,6 +19,7 @@ pub(super) struct SlotFit {
     pub half: f64,
     /// distance from it, m
     pub radius: f64,
+    pub ends: Ends,
 }
 
 /// Directions that are tried as first guesses.
@@ -28,9 +32,27 @@ const BESIDE: f64 = 0.2e-3;
 const AGREES: f64 = 20e-6;
 /// Where along it the place is that the ball fell in, over its half length.
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
+/// The other ends are believed where they lower the residuals to less than this share.
+const BETTER: f64 = 0.5;
+/// A slot with straight ends may be shorter than wide by this, over half its width: what is nearly square has no long side to choose.
+const SHORTER: f64 = 0.5;
+/// Slots with straight ends are turned so that they are longer than wide, but for this share of half the width.
+const SQUARE: f64 = 0.02;
+/// Corners of straight ends are as large as this at most, over the distance of the ball's centre from the middle line …
+pub(super) const CORNER: f64 = 0.5;
+/// … and which points are of them is decided so many times.
+const CORNER_ROUNDS: usize = 3;
+/// So many of the points lie elsewhere.
+const LEAST_KEPT: f64 = 0.6;
+/// Of the fit.
+const FREEDOMS: usize = 5;
 /// All of its steps are made: no touch says how near is near enough.
 const SEARCH: DampedSearch =
     DampedSearch { first: 1e-3, factors: [0.2, 5.0], least: 0.0, most: f64::INFINITY, tries: 60 };
+/// Of first guesses with straight ends, whose best one is fitted in full.
+const COARSE: DampedSearch = DampedSearch { tries: 12, ..SEARCH };
+/// A fit that does not agree with the points is looked for anew at each so many of them.
+const ANEW: usize = 4;
 /// What no touch determines stays where it is: weight of the guess against one touch.
 const HELD: f64 = 1e-9;
 
@@ -45,11 +67,28 @@ impl SlotFit {
         let (u, v) = (p - self.middle, self.along());
         let w = Vector2::new(-v.y, v.x);
         let (x, y) = (u.dot(&v), u.dot(&w));
-        let (distance, n) = from_segment(x, y, self.half);
+        let (residual, n) = match self.ends {
+            Ends::Round => {
+                let (distance, n) = from_segment(x, y, self.half);
+                (distance - self.radius, n)
+            }
+            Ends::Straight => self.outside_rectangle(x, y),
+        };
         let by_middle = -(v * n[0] + w * n[1]);
         // turning the segment by a moves the point to (x + a y, y − a x) of its axes
         let by_angle = n[0] * y - n[1] * x;
-        (distance - self.radius, Vector5::new(by_middle.x, by_middle.y, by_angle, -n[0].abs(), -1.0))
+        let by_radius = if self.ends == Ends::Round { -1.0 } else { -n[0].abs() - n[1].abs() };
+        (residual, Vector5::new(by_middle.x, by_middle.y, by_angle, -n[0].abs(), by_radius))
+    }
+
+    /// Distance of a place of its axes from its nearest side, m, and the unit vector away from it.
+    fn outside_rectangle(&self, x: f64, y: f64) -> (f64, [f64; 2]) {
+        let (beyond_end, beyond_wall) = (x.abs() - self.half - self.radius, y.abs() - self.radius);
+        if beyond_end > beyond_wall {
+            (beyond_end, [1f64.copysign(x), 0.0])
+        } else {
+            (beyond_wall, [0.0, 1f64.copysign(y)])
+        }
     }
 
     fn rms(&self, points: &[Point2<f64>]) -> f64 {
@@ -58,6 +97,10 @@ impl SlotFit {
 
     /// By least squares from a first guess.
     pub fn fitted(self, points: &[Point2<f64>]) -> Self {
+        self.fitted_by(&SEARCH, points)
+    }
+
+    fn fitted_by(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
         let scale = points.iter().map(|p| (p - self.middle).norm()).fold(1e-6, f64::max);
         // in units of the size, an angle is as large as a length
         let units = Vector5::new(scale, scale, 1.0, scale, scale);
@@ -76,41 +119,123 @@ impl SlotFit {
         };
         let better = |slot: &Self, solved: &Vector5<f64>, before: f64| {
             let step = solved.component_mul(&units);
+            let radius = (slot.radius + step[4]).abs();
+            let shortest = if slot.ends == Ends::Round { 0.0 } else { -SHORTER * radius };
             let next = Self {
                 middle: slot.middle + step.fixed_rows::<2>(0),
                 angle: slot.angle + step[2],
-                half: (slot.half + step[3]).max(0.0),
-                radius: (slot.radius + step[4]).abs(),
+                half: (slot.half + step[3]).max(shortest),
+                radius,
+                ends: slot.ends,
             };
             Some((next, next.rms(points))).filter(|(_, rms)| *rms < before)
         };
-        SEARCH.run((self, self.rms(points)), equations, damped, better, |_, _| false).0
+        search.run((self, self.rms(points)), equations, damped, better, |_, _| false).0
+    }
+
+    /// The same of a slot with straight ends, without the points of its corners; what is longer than wide.
+    fn fitted_straight(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
+        let begun = self.fitted_by(search, points);
+        let fitted = (0..CORNER_ROUNDS).fold(begun, |fit, _| fit.fitted_by(search, &fit.off_corners(points)));
+        if fitted.half >= -SQUARE * fitted.radius {
+            return fitted;
+        }
+        let [radius, half] = [fitted.radius + fitted.half, -fitted.half];
+        Self { angle: fitted.angle + FRAC_PI_2, radius, half, ..fitted }.fitted_by(search, &fitted.off_corners(points))
+    }
+
+    /// Whether a point may be of a corner of straight ends, which is no corner of the fit.
+    pub fn is_in_corner(&self, p: &Point2<f64>) -> bool {
+        let (u, v) = (p - self.middle, self.along());
+        let corner = CORNER * self.radius;
+        let is_near = |place: f64, half: f64| half - place.abs() < corner;
+        self.ends == Ends::Straight && is_near(u.dot(&v), self.half + self.radius) && is_near(v.perp(&u), self.radius)
+    }
+
+    fn off_corners(&self, points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+        points.iter().filter(|p| !self.is_in_corner(p)).copied().collect()
+    }
+
+    /// How many free places are outside of it, and its residuals but for corners, rms by the degrees of freedom, m; infinite where too few
+    /// points are left.
+    fn cost(&self, points: &[Point2<f64>], free: &[Point2<f64>]) -> (usize, f64) {
+        let kept = self.off_corners(points);
+        let beside = free.iter().filter(|p| self.residual(p).0 > BESIDE).count();
+        let is_enough = kept.len() > FREEDOMS && kept.len() as f64 >= LEAST_KEPT * points.len() as f64;
+        let squares: f64 = kept.iter().map(|p| self.residual(p).0.powi(2)).sum();
+        let all_round = self.ends == Ends::Round && kept.len() <= FREEDOMS;
+        let degrees = if all_round { kept.len() } else { kept.len().saturating_sub(FREEDOMS) };
+        let rms = if is_enough || all_round { (squares / degrees.max(1) as f64).sqrt() } else { f64::INFINITY };
+        (beside, rms)
+    }
+
+    /// Its fit to more points; where that does not agree with them, now and then the best of all.
+    ///
+    /// - `agrees`: residuals of a fit that does, m.
+    pub fn fitted_to_more(self, points: &[Point2<f64>], free: &[Point2<f64>], agrees: f64) -> Self {
+        let near = if self.ends == Ends::Round { self.fitted(points) } else { self.fitted_straight(&SEARCH, points) };
+        let cost = near.cost(points, free);
+        if cost.0 == 0 && cost.1 <= agrees || !points.len().is_multiple_of(ANEW) {
+            return near;
+        }
+        let other = Self::through(points, free, &self.middle, agrees).filter(|other| {
+            let (beside, rms) = other.cost(points, free);
+            beside <= cost.0 && rms < BETTER * cost.1
+        });
+        other.unwrap_or(near)
     }
 
     /// The best one through points around a place, in any direction, among those with the free places inside. Where no point is at an
-    /// end many lengths agree: then the shortest of them, whose ends lie no farther than what was touched.
-    pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>) -> Option<Self> {
+    /// end many lengths agree: then the shortest of them, whose ends lie no farther than what was touched. Ends are round where the points
+    /// do not say otherwise.
+    ///
+    /// - `agrees`: residuals of a fit that agrees with the points, m.
+    pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>, agrees: f64) -> Option<Self> {
+        let agrees = agrees.max(AGREES);
+        let round = Self::best(points, free, place, Ends::Round, agrees)?;
+        let (beside, rms) = round.cost(points, free);
+        if beside == 0 && rms <= agrees {
+            return Some(round);
+        }
+        let straight = Self::best(points, free, place, Ends::Straight, agrees)?.fitted_straight(&SEARCH, points);
+        let (straight_beside, straight_rms) = straight.cost(points, free);
+        let is_straight = straight_beside <= beside && straight_rms < BETTER * rms;
+        Some(if is_straight { straight } else { round })
+    }
+
+    fn best(
+        points: &[Point2<f64>],
+        free: &[Point2<f64>],
+        place: &Point2<f64>,
+        ends: Ends,
+        agrees: f64,
+    ) -> Option<Self> {
         let distance = |p: &Point2<f64>| (p - place).norm();
         let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
         let far = points.iter().chain(free).map(distance).fold(0.0, f64::max);
         // a point beside the segment determines neither end: one of them has to be near where it really is
         let guess = |angle: f64, half: f64, shift: f64| {
             let direction = Vector2::new(angle.cos(), angle.sin());
-            Self { middle: place + direction * (shift * half), angle, half, radius: near }
+            Self { middle: place + direction * (shift * half), angle, half, radius: near, ends }
         };
-        let angles = (0..ANGLES).map(|step| step as f64 / ANGLES as f64 * std::f64::consts::PI);
+        let angles = (0..ANGLES).map(|step| step as f64 / ANGLES as f64 * PI);
         let sized = angles.flat_map(|angle| HALVES.map(|half| (angle, half * far)));
         let guesses = sized.flat_map(|(angle, half)| SHIFTS.map(|shift| guess(angle, half, shift)));
-        let beside = |fit: &Self| free.iter().filter(|p| fit.residual(p).0 > BESIDE).count();
-        let fits = guesses.map(|guess| guess.fitted(points));
-        let fits = fits.map(|fit| (beside(&fit), fit.rms(points).max(AGREES), fit));
+        let fits = guesses.map(|guess| match ends {
+            Ends::Round => guess.fitted(points),
+            Ends::Straight => guess.fitted_straight(&COARSE, points),
+        });
+        let fits = fits.map(|fit| {
+            let (beside, rms) = fit.cost(points, free);
+            (beside, rms.max(agrees), fit)
+        });
         let shorter = |a: &Self, b: &Self| a.half.total_cmp(&b.half);
         fits.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(shorter(&a.2, &b.2))).map(|(.., fit)| fit)
     }
 
     /// The same, with its direction as that of another rather than against it.
     pub fn along_as(self, other: &Self) -> Self {
-        let turn = if self.along().dot(&other.along()) < 0.0 { std::f64::consts::PI } else { 0.0 };
+        let turn = if self.along().dot(&other.along()) < 0.0 { PI } else { 0.0 };
         Self { angle: self.angle + turn, ..self }
     }
 }
@@ -129,7 +254,7 @@ mod tests {
             let p = turn * Point2::new(p[0] * 1e-3, p[1] * 1e-3);
             Point2::from(p.coords)
         });
-        let found = SlotFit::through(&points, &[], &Point2::origin()).unwrap();
+        let found = SlotFit::through(&points, &[], &Point2::origin(), 0.0).unwrap();
         let middle = turn * Point2::new(-2e-3, 0.0);
         assert!((found.middle - middle).norm() < 1e-8, "{found:?}");
         assert!((found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8, "{found:?}");
@@ -142,7 +267,7 @@ mod tests {
         let walls =
             [[-4.0, 1.5], [-1.0, 1.5], [0.5, 1.5], [3.0, 1.5], [-3.0, -1.5], [-0.5, -1.5], [1.0, -1.5], [4.5, -1.5]];
         let points = walls.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
-        let found = SlotFit::through(&points, &[], &Point2::origin()).unwrap();
+        let found = SlotFit::through(&points, &[], &Point2::origin(), 0.0).unwrap();
         assert!(found.along().y.abs() < 0.02 && (found.radius - 1.5e-3).abs() < 0.05e-3, "{found:?}");
         assert!(found.half > 3.5e-3 && found.half < 7e-3, "{found:?}");
     }
@@ -154,7 +279,7 @@ mod tests {
         let points = [[1.15, 0.0], [0.85, 1.08], [0.0, 1.46], [-1.5, 1.5], [-1.5, -1.5], [0.0, -1.46], [0.85, -1.08]];
         let points = points.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
         let free = [Point2::new(-12e-3, 0.0)];
-        let found = SlotFit::through(&points, &free, &Point2::origin()).unwrap();
+        let found = SlotFit::through(&points, &free, &Point2::origin(), 0.0).unwrap();
         assert!(found.along().y.abs() < 0.05 && (found.radius - 1.5e-3).abs() < 0.1e-3, "{found:?}");
         assert!(found.half > 5e-3, "{found:?}");
     }
