@@ -79,6 +79,8 @@ struct Ordered {
     turn: f64,
     /// axis in B, and the speed of force mode along it, m/s
     press: Option<(Vector3<f64>, f64)>,
+    /// whether the order is to rest, also where the velocity is not zero yet
+    rests: bool,
 }
 
 /// What was ordered lately.
@@ -101,7 +103,7 @@ impl Obedience {
     ///
     /// - `now`: since some moment, as all times here.
     pub fn new(now: Duration) -> Self {
-        let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None };
+        let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None, rests: true };
         Self {
             ordered: VecDeque::from([rest]),
             target: Vector3::zeros(),
@@ -124,7 +126,8 @@ impl Obedience {
         };
         (self.target, self.acceleration, self.ordered_at) = (target, acceleration, now);
         let linear = self.newest().linear;
-        self.push(Ordered { at: now, linear, turn, press });
+        let rests = target == Vector3::zeros() && turn == 0.0 && press.is_none();
+        self.push(Ordered { at: now, linear, turn, press, rests });
     }
 
     fn newest(&self) -> Ordered {
@@ -140,7 +143,7 @@ impl Obedience {
             self.go_on(stale);
             (self.target, self.acceleration) = (Vector3::zeros(), REST);
             let linear = self.newest().linear;
-            self.push(Ordered { at: stale, linear, turn: 0.0, press: None });
+            self.push(Ordered { at: stale, linear, turn: 0.0, press: None, rests: true });
         }
         self.go_on(now);
     }
@@ -173,7 +176,7 @@ impl Obedience {
         };
         let is_ordered = recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
         let most_turn = recent(TURN_WINDOW).map(|one| one.turn).fold(0.0, f64::max);
-        let rests = most_turn == 0.0 && recent(WINDOW).all(|one| one.linear == Vector3::zeros() && one.press.is_none());
+        let rests = most_turn == 0.0 && recent(WINDOW).all(|one| one.rests && one.linear == Vector3::zeros());
         let ordered_mm_per_s = self.newest().linear.norm() * 1e3;
         let fault =
             || ArmError::Disobeys { mm_per_s: linear.norm() * 1e3, ordered_mm_per_s, deg_per_s: turn.to_degrees() };
