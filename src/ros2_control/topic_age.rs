@@ -136,9 +136,8 @@ mod tests {
         let mut age = TopicAge::new("t", begun);
         for second in 0..3600_u64 {
             let now = begun + Duration::from_secs(second);
-            for stamp_ns in [second as i64 * 1_000_000_000 - second as i64 * 100_000] {
-                assert_eq!(age.see(stamp_ns, SILENT, now), Ok(true), "{second} s");
-            }
+            let stamp_ns = second as i64 * (1_000_000_000 - 100_000);
+            assert_eq!(age.see(stamp_ns, SILENT, now), Ok(true), "{second} s");
         }
     }
 }
