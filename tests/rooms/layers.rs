@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Each room and the rooms it may use; itself always. A room that is missing here fails the check. The crates of the simulator, of files and
 /// of the report are a room each. Circles between crates need no check: cargo refuses them.
@@ -476,26 +476,29 @@ fn every_room_keeps_to_the_flow_of_data() {
             "no file is in the room {room} of the table"
         );
     }
-    let tests: BTreeSet<_> = files.iter().flat_map(|(file, source)| files_of_tests(file, source)).collect();
-    let of_program = files.iter().filter(|(file, _)| !tests.contains(file));
+    let tests: BTreeSet<_> = files.iter().flat_map(|(file, source)| modules_of_tests(file, source)).collect();
+    let is_of_tests = |file: &str| Path::new(file).with_extension("").ancestors().any(|module| tests.contains(module));
+    let of_program = files.iter().filter(|(file, _)| !is_of_tests(file));
     let found: Vec<_> = of_program.flat_map(|(file, source)| breaches(file, source)).collect();
     assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
-/// The files that a file has for its tests alone: modules that it declares below `#[cfg(test)]`. They may use all rooms.
-fn files_of_tests(file: &str, source: &str) -> Vec<String> {
+/// The modules that a file has for its tests alone, without extension: those that it declares below `#[cfg(test)]`. They and all that is
+/// below them may use all rooms.
+fn modules_of_tests(file: &str, source: &str) -> Vec<PathBuf> {
     let folder = file.strip_suffix("/mod.rs").or(file.strip_suffix("/lib.rs")).or(file.strip_suffix(".rs"));
     let declared = source.split("#[cfg(test)]").skip(1).filter_map(|after| after.trim_start().strip_prefix("mod "));
     let name = |after: &str| after.split_once(';').map(|(name, _)| name.to_owned()).filter(|name| !name.contains('{'));
-    declared.filter_map(name).map(|name| format!("{}/{name}.rs", folder.unwrap_or_default())).collect()
+    declared.filter_map(name).map(|name| Path::new(folder.unwrap_or_default()).join(name)).collect()
 }
 
 #[test]
 fn modules_of_tests_alone_are_known() {
     let source =
         "#[cfg(test)]\nmod scripted;\nmod b;\n#[cfg(test)]\nmod tests {\n    mod inner;\n}\n#[cfg(test)]\nmod more;\n";
-    assert_eq!(files_of_tests("src/ur/control.rs", source), ["src/ur/control/scripted.rs", "src/ur/control/more.rs"]);
-    assert_eq!(files_of_tests("src/ur/mod.rs", "#[cfg(test)]\nmod a;"), ["src/ur/a.rs"]);
+    let of_control = ["src/ur/control/scripted", "src/ur/control/more"].map(PathBuf::from);
+    assert_eq!(modules_of_tests("src/ur/control.rs", source), of_control);
+    assert_eq!(modules_of_tests("src/ur/mod.rs", "#[cfg(test)]\nmod a;"), [PathBuf::from("src/ur/a")]);
 }
 
 const CORE: &str = "crates/touchup-core/src";

@@ -41,7 +41,7 @@ fn measured(pocket: &Pocket, kind: Kind, scan: &TriMesh, seed: u64) -> Result<([
     let middle = Point3::new(pocket.middle[0], pocket.middle[1], TOP);
     let flag = middle + Vector3::new(some(2e-3), some(2e-3), some(0.2e-3));
     let normal = Unit::new_normalize(Vector3::new(some(0.03), some(0.03), 1.0));
-    let params = PatternParams { sigma: 10e-6, ..PatternParams::default() };
+    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
     let mut search = Explorer::new(Some(kind), &flag, &normal, params, scan).unwrap();
     while let Some(planned) = search.next_touch() {
         let noise: f64 = StandardNormal.sample(&mut rng);

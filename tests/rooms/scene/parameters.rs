@@ -140,7 +140,7 @@ refine.along - normal0,force
 ";
 
 /// The sections, and whether they are built in the default scene.
-const SECTIONS: [(&str, bool); 18] = [
+const SECTIONS: [(&str, bool); 19] = [
     ("sync", true),
     ("clock", true),
     ("markers", false),
@@ -158,6 +158,7 @@ const SECTIONS: [(&str, bool); 18] = [
     ("patch", true),
     ("uncertainty", true),
     ("robot", false),
+    ("robot.ros2_control", false),
     ("refine", true),
 ];
 

@@ -15,6 +15,8 @@ use crate::numeric::{NormalEquations, mean};
 
 /// Directions that are candidates.
 const DIRECTIONS: usize = 24;
+/// Of a round wall.
+const LEAN: [Freedom; 2] = [Freedom::TiltX, Freedom::TiltY];
 /// Walls lean when they do so by more than this many standard deviations.
 const LEANS: f64 = 4.0;
 /// … by so many touches more than there are unknowns: of fewer a single one that met something else makes a lean.
@@ -84,7 +86,7 @@ impl RoundWall {
     fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
         let sigma = context.params.sigma;
         let asked = Asked::default();
-        let (lean, fit) = context.squareness(guess, &self.measuring.observations);
+        let (lean, fit) = context.squareness(guess, &self.measuring.observations, &LEAN);
         let asked = match context.params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
@@ -135,7 +137,8 @@ impl RoundWall {
         let middle = self.guess(context).pose_of.translation.vector.into();
         let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
         let lean = top.axis_std().map_or(context.lean, |both| both / SQRT_2);
-        let (_, params) = SearchContext { lean, ..context.clone() }.squareness(&guess, &self.measuring.observations);
+        let (_, params) =
+            SearchContext { lean, ..context.clone() }.squareness(&guess, &self.measuring.observations, &LEAN);
         fit(&guess, &self.measuring.observations, &params)
     }
 
@@ -155,17 +158,21 @@ impl RoundWall {
 impl SearchContext {
     /// What is known before of how much walls lean against z of F, rad in each of two directions, and how they are fitted: as perpendicular to
     /// the surface, or freely where their touches say that they are not.
-    pub fn squareness<M: Surface>(&self, guess: &M, touches: &[Observation]) -> (f64, FitParams) {
+    ///
+    /// - `leans`: what may say so.
+    pub fn squareness<M: Surface>(&self, guess: &M, touches: &[Observation], leans: &[Freedom]) -> (f64, FitParams) {
         let known = self.params.square.hypot(self.lean);
         let freely = fit(guess, touches, &FitParams::default()).ok().filter(|free| free.degrees >= LEAST_DEGREES);
-        let leans = freely.is_some_and(|free| {
+        let is_leaning = freely.is_some_and(|free| {
             // how far its axis is off that of the guess, in the directions of its own x and y
             let before = guess.pose_of().rotation * Vector3::z();
             let off = free.surface.pose_of().inverse_transform_vector(&before);
-            let of = |lean: f64, std: Option<f64>| std.is_some_and(|std| lean.abs() > LEANS * std.hypot(known));
-            of(off.x, free.std(Freedom::TiltX)) || of(off.y, free.std(Freedom::TiltY))
+            leans.iter().any(|lean| {
+                let off = if *lean == Freedom::TiltX { off.x } else { off.y };
+                free.std(*lean).is_some_and(|std| off.abs() > LEANS * std.hypot(known))
+            })
         });
-        if leans { (MOST_LEAN, FitParams::default()) } else { (known, square(known)) }
+        if is_leaning { (MOST_LEAN, FitParams::default()) } else { (known, square(known)) }
     }
 }
 
@@ -243,15 +250,15 @@ mod tests {
         };
         let guess = Cylinder::new(Point3::origin(), &Vector3::z(), 4e-3, true);
         let known = PatternParams::default().square.hypot(1e-3);
-        let (sigma, params) = context.squareness(&guess, &touches(0.5 * known));
+        let (sigma, params) = context.squareness(&guess, &touches(0.5 * known), &LEAN);
         assert_eq!((sigma, params.axis_sigma), (known, Some(known)));
         let leaning = touches(5f64.to_radians());
-        let (_, params) = context.squareness(&guess, &leaning);
+        let (_, params) = context.squareness(&guess, &leaning, &LEAN);
         assert_eq!(params.axis_sigma, None);
         let axis = fit(&guess, &leaning, &params).unwrap().surface.axis();
         let drawn = Vector3::new(5f64.to_radians().sin(), 0.0, 5f64.to_radians().cos());
         assert!(axis.cross(&drawn).norm() < 3e-3, "{axis:?}");
         // half of them: not enough to say so
-        assert_eq!(context.squareness(&guess, &leaning[..6]).1.axis_sigma, Some(known));
+        assert_eq!(context.squareness(&guess, &leaning[..6], &LEAN).1.axis_sigma, Some(known));
     }
 }

@@ -26,6 +26,8 @@ use super::slot_fit::{CORNER, SlotFit};
 use crate::features::fit::{Ends, Freedom, Observation, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
+/// What may say that walls lean: both of them, across the slot. Along it only its ends would, and what was taken for one may be an obstacle.
+const LEAN: [Freedom; 1] = [Freedom::TiltY];
 /// First directions: five numbers are unknown.
 const FIRST: usize = 8;
 /// Walls that have to be touched in them.
@@ -126,7 +128,7 @@ impl SlotPattern {
 
     fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
         let params = &context.params;
-        let (sigma, (lean, fit)) = (params.sigma, context.squareness(walls, &self.measuring.observations));
+        let (sigma, (lean, fit)) = (params.sigma, context.squareness(walls, &self.measuring.observations, &LEAN));
         let asked = Asked::default();
         let asked = match params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
@@ -152,7 +154,7 @@ impl SlotPattern {
     /// for none of these walls do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let (half, ball) = ((walls.length - walls.width).max(0.0) / 2.0, context.params.ball_radius);
-        let (_, params) = context.squareness(walls, &self.measuring.observations);
+        let (_, params) = context.squareness(walls, &self.measuring.observations, &LEAN);
         let fitted = fit(walls, &self.measuring.observations, &params).ok();
         let used = fitted.iter().flat_map(|fitted| &fitted.used);
         let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
@@ -400,7 +402,7 @@ impl Stage for SlotPattern {
         let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
         let walls = self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
-        let (_, params) = context.squareness(walls, &self.measuring.observations);
+        let (_, params) = context.squareness(walls, &self.measuring.observations, &LEAN);
         let fitted = fit(walls, &self.measuring.observations, &params)?;
         // where an end was not touched it has no length, and no middle
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
