@@ -72,19 +72,21 @@ impl UrArm {
         if least_s > PERIOD * SAME_PERIOD {
             return Err(UrError::Rate { host: params.host.clone(), hz: 1.0 / least_s, needed_hz: 1.0 / PERIOD });
         }
-        let late = loop {
-            match client.late_at_start() {
-                Some(late) => break late,
-                None => last = next()?,
-            }
-        };
-        if !late.is_tolerable() {
+        if !client.is_lock_step {
+            let late = loop {
+                match client.late_at_start() {
+                    Some(late) => break late,
+                    None => last = next()?,
+                }
+            };
             let StartLateness { usual_ms, worst_ms } = late;
-            return Err(UrError::Busy { host: params.host.clone(), usual_ms, worst_ms });
-        }
-        tracing::info!(usual_ms = late.usual_ms, worst_ms = late.worst_ms, "states of the arm come late by");
-        if let Err(error) = priority::raise(priority::CALLER, false) {
-            tracing::warn!("{}", priority::remedy(&error));
+            if !late.is_tolerable() {
+                return Err(UrError::Busy { host: params.host.clone(), usual_ms, worst_ms });
+            }
+            tracing::info!(usual_ms, worst_ms, "states of the arm come late by");
+            if let Err(error) = priority::raise(priority::CALLER, false) {
+                tracing::warn!("{}", priority::remedy(&error));
+            }
         }
         if let Some(slowed) = last.slowed() {
             tracing::warn!("{slowed}: links, searches and retractions take as much longer, and may end as not arrived");

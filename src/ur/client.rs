@@ -24,8 +24,17 @@ pub(super) struct Client {
     orders: Option<ChildStdin>,
     guard: Option<JoinHandle<Option<Halt>>>,
     halt: Option<Halt>,
+    /// whether the controller is a simulation that waits for this client: nothing comes late then
+    pub is_lock_step: bool,
     /// of the process
     pub id: u32,
+}
+
+/// The priority of a thread that watches the arm; who commands the arm says where it is refused.
+fn be_in_time(is_lock_step: bool) {
+    if !is_lock_step {
+        let _ = priority::raise(priority::GUARD, false);
+    }
 }
 
 impl Client {
@@ -61,8 +70,7 @@ impl Client {
         let sent = line_of(&begin).and_then(|line| orders.write_all(&line));
         let (sender, reports) = channel();
         thread::spawn(move || {
-            // who commands the arm says where that is refused
-            let _ = priority::raise(priority::GUARD, false);
+            be_in_time(is_lock_step);
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
                 let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
                     tracing::warn!(line, "the program that speaks to the arm said what is no report");
@@ -83,8 +91,11 @@ impl Client {
         let shared = Arc::new(SharedGuard::new(params.deadlines, clock));
         let id = child.id();
         let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };
-        let guard = thread::spawn(move || guard.watch(&reports));
-        let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, id };
+        let guard = thread::spawn(move || {
+            be_in_time(is_lock_step);
+            guard.watch(&reports)
+        });
+        let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, is_lock_step, id };
         sent.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
         let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| known.is_ready);
         match known.broken.clone() {

@@ -16,7 +16,6 @@ use nalgebra::Vector3;
 use super::dashboard::Dashboard;
 use super::lateness::Lateness;
 use super::params::Deadlines;
-use super::priority;
 use super::protocol::{Action, ClientReport, Link, ProgramState, UrState, pose_of};
 use crate::clock::{Clock, ManualClock};
 use crate::probing::arm::{ArmError, Obedience, OrderedMotion, Safety};
@@ -333,8 +332,6 @@ pub(super) struct Guard {
 impl Guard {
     /// Until the client ends; returns how the arm was stopped when that was not wanted.
     pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
-        // who starts the client says where that is refused
-        let _ = priority::raise(priority::GUARD, false);
         let clock = self.shared.clock.clone();
         let mut stamp_s = f64::INFINITY;
         let broken = loop {

@@ -31,11 +31,13 @@ use crate::clock::Clock;
 /// # Errors
 /// [`ChildError`], when it cannot begin. Later errors go out as reports.
 pub fn run() -> Result<(), ChildError> {
-    // for all threads, those of the library too; who started this process says where it is refused
-    let _ = priority::raise(priority::CLIENT, true);
     let mut lines = BufReader::new(stdin()).lines().map_while(Result::ok);
     let first = lines.next().unwrap_or_default();
     let begin: Begin = serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
+    if !begin.is_lock_step {
+        // for all threads, those of the library too; who started this process says where it is refused
+        let _ = priority::raise(priority::CLIENT, true);
+    }
     let reports = stdout().as_fd().try_clone_to_owned().map_err(|error| ChildError::NoOrders(error.to_string()))?;
     let shared = ChildShared::new(lines_to(reports.into()));
     if let Err(error) = library::load(&begin.site_packages) {
