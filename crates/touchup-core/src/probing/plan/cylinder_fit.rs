@@ -223,7 +223,7 @@ mod tests {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean);
         let place = |group: u32| {
             let angle = TAU * f64::from(group) / 12.0;
-            let depth = if group % 2 == 0 { 1e-3 } else { 5e-3 };
+            let depth = if group.is_multiple_of(2) { 1e-3 } else { 5e-3 };
             let noise = 5e-6 * (7.0 * f64::from(group)).sin();
             let point = turn * Point3::from(toward(angle / TAU) * (4e-3 - BALL + noise) - Vector3::z() * depth);
             Observation { point, offset: BALL, sigma: 5e-6, group }
