@@ -238,7 +238,7 @@ mod tests {
         assert_eq!((rate.r#type, rate.read_only, range.from_value, range.to_value), (3, false, 0.1, 100.0));
         let robot = describe("robot");
         assert_eq!((robot.r#type, robot.read_only), (4, true));
-        assert_eq!(robot.additional_constraints, "one of none, sim, ur");
+        assert_eq!(robot.additional_constraints, "one of none, sim, ur, ros2_control");
         assert_eq!(describe("use_sim_time").r#type, 1);
         assert_eq!((describe("nothing").r#type, describe("nothing").name.as_str()), (0, "nothing"));
     }
