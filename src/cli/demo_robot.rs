@@ -76,7 +76,7 @@ reported! {
         touches: usize = probed.map_or(0, |probed| probed.touches.len()),
         duration_s: f64 = probed.map_or(0.0, |probed| probed.seconds),
         largest_force_n: f64 = probed.map_or(0.0, |probed| probed.peak_force),
-        /// across the axis, of an edge across itself
+        /// across the axis, of the step across its edge
         place_mm: Option<f64> = found.map(|found| place_error(found, truth) * 1e3),
         /// of the diameter, or of the width and the length
         sizes_mm: Vec<f64> = numbers(found, truth).iter().map(|number| number.error_mm).collect(),
@@ -189,14 +189,16 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     Flag { id, kind: Some(kind_of(&feature.shape)), place, radius: CLICK }
 }
 
-/// Error of the place, m.
+/// Error of the place in the directions that its uncertainty is of, m: across the axis, of the step across its edge.
 fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
     let off = found.centre.value - truth.centre;
-    match truth.shape {
+    let along = match truth.shape {
         // where along it the edge was touched is no error
-        TruthShape::Step { direction, .. } => (off - direction * off.dot(&direction)).norm(),
-        _ => off.norm(),
-    }
+        TruthShape::Step { direction, .. } => direction,
+        // the features of the plate are perpendicular to its top
+        _ => Vector3::z(),
+    };
+    (off - along * off.dot(&along)).norm()
 }
 
 /// Where it is off, and how far it may be.

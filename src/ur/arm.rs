@@ -33,6 +33,7 @@ const SETTLING_TIME: f64 = 60e-3;
 const FEED_ACCELERATION: f64 = 0.5;
 /// Most that anything may ask for, m/s².
 const TOP_ACCELERATION: f64 = 10.0;
+
 /// A UR arm that holds a probe.
 ///
 /// Its client lives in a process of its own. Whatever happens to it, the arm is stopped by the dashboard, and where that does

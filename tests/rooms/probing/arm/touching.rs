@@ -165,6 +165,12 @@ pub(super) fn explored(arm: &mut SimArm, params: &ArmParams, touching: &TouchPar
     peak
 }
 
+/// Of the scan of the plate, by touches that repeat within 5 µm.
+fn hole_search(flag: &Point3<f64>) -> Explorer {
+    let params = PatternParams { touch_sigma: 5e-6, ..PatternParams::default() };
+    Explorer::new(Some(Kind::Hole), flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap()
+}
+
 /// From a click up to 3 mm off and no size: place and diameter of both holes of the plate, which are known in closed form.
 #[test]
 fn a_hole_is_found_from_one_click_and_measured() {
@@ -180,14 +186,7 @@ fn a_hole_is_found_from_one_click_and_measured() {
         let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
         let flag = Point3::new(x + off * angle.cos(), y + off * angle.sin(), TOP + rng.random_range(-0.5e-3..0.5e-3));
         let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [x, y, 30e-3])).unwrap();
-        let mut search = Explorer::new(
-            Some(Kind::Hole),
-            &flag,
-            &Vector3::z_axis(),
-            PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
-            &plate_scan(1),
-        )
-        .unwrap();
+        let mut search = hole_search(&flag);
         let peak = explored(&mut arm, &params, &touching, &mut search);
         let found = search.found().unwrap();
         let feature = found.feature.as_ref().unwrap();
@@ -217,14 +216,7 @@ fn where_no_hole_is_none_is_found() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 30e-3])).unwrap();
     let flag = Point3::new(45e-3, 8e-3, TOP);
-    let mut search = Explorer::new(
-        Some(Kind::Hole),
-        &flag,
-        &Vector3::z_axis(),
-        PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
-        &plate_scan(1),
-    )
-    .unwrap();
+    let mut search = hole_search(&flag);
     explored(&mut arm, &params, &TouchParams::default(), &mut search);
     assert!(matches!(search.found(), Err(ExploreError::NotFound { .. })), "{:?}", search.found());
 }

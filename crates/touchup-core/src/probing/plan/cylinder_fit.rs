@@ -86,7 +86,7 @@ impl RoundWall {
     fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
         let sigma = context.params.sigma;
         let asked = Asked::default();
-        let (lean, fit) = context.squareness(guess, &self.measuring.observations, &LEAN);
+        let (lean, fit) = squareness(context.square(context.lean), guess, &self.measuring.observations, &LEAN);
         let asked = match context.params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
@@ -137,8 +137,7 @@ impl RoundWall {
         let middle = self.guess(context).pose_of.translation.vector.into();
         let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
         let lean = top.axis_std().map_or(context.lean, |both| both / SQRT_2);
-        let (_, params) =
-            SearchContext { lean, ..context.clone() }.squareness(&guess, &self.measuring.observations, &LEAN);
+        let (_, params) = squareness(context.square(lean), &guess, &self.measuring.observations, &LEAN);
         fit(&guess, &self.measuring.observations, &params)
     }
 
@@ -156,29 +155,38 @@ impl RoundWall {
 }
 
 impl SearchContext {
-    /// What is known before of how much walls lean against z of F, rad in each of two directions, and how they are fitted: as perpendicular to
-    /// the surface, or freely where their touches say that they are not.
+    /// How far walls may lean against the normal of a surface, standard deviation in each of two directions, rad.
     ///
-    /// - `leans`: what may say so.
-    pub fn squareness<M: Surface>(&self, guess: &M, touches: &[Observation], leans: &[Freedom]) -> (f64, FitParams) {
-        let known = self.params.square.hypot(self.lean);
-        let freely = fit(guess, touches, &FitParams::default()).ok().filter(|free| free.degrees >= LEAST_DEGREES);
-        let is_leaning = freely.is_some_and(|free| {
-            // how far its axis is off that of the guess, in the directions of its own x and y
-            let before = guess.pose_of().rotation * Vector3::z();
-            let off = free.surface.pose_of().inverse_transform_vector(&before);
-            leans.iter().any(|lean| {
-                let off = if *lean == Freedom::TiltX { off.x } else { off.y };
-                free.std(*lean).is_some_and(|std| off.abs() > LEANS * std.hypot(known))
-            })
-        });
-        if is_leaning { (MOST_LEAN, FitParams::default()) } else { (known, square(known)) }
+    /// - `lean`: of that normal as it was measured, likewise.
+    pub fn square(&self, lean: f64) -> f64 {
+        self.params.square.hypot(lean)
     }
 }
 
-/// Of walls that are perpendicular to their surface within this, rad.
-fn square(sigma: f64) -> FitParams {
-    FitParams { axis_sigma: Some(sigma), ..FitParams::default() }
+/// What is known before of how much walls lean against the axis of a guess, rad in each of two directions, and how they are fitted: within that,
+/// or freely where their touches say that they lean by more.
+///
+/// - `known`: of walls that are perpendicular to their surface, rad; `leans`: what may say that they are not.
+pub(super) fn squareness<M: Surface>(
+    known: f64,
+    guess: &M,
+    touches: &[Observation],
+    leans: &[Freedom],
+) -> (f64, FitParams) {
+    let freely = fit(guess, touches, &FitParams::default()).ok().filter(|free| free.degrees >= LEAST_DEGREES);
+    let is_leaning = freely.is_some_and(|free| {
+        // how far its axis is off that of the guess, in the directions of its own x and y
+        let before = guess.pose_of().rotation * Vector3::z();
+        let off = free.surface.pose_of().inverse_transform_vector(&before);
+        leans.iter().any(|lean| {
+            let off = if *lean == Freedom::TiltX { off.x } else { off.y };
+            free.std(*lean).is_some_and(|std| off.abs() > LEANS * std.hypot(known))
+        })
+    });
+    match is_leaning {
+        true => (MOST_LEAN, FitParams::default()),
+        false => (known, FitParams { axis_sigma: Some(known), ..FitParams::default() }),
+    }
 }
 
 /// A wall is searched so much farther than expected, m.
@@ -212,9 +220,6 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::mesh::TriMesh;
-    use crate::probing::plan::outline::Outline;
-    use crate::probing::plan::search_context::PatternParams;
 
     const BALL: f64 = 1.5e-3;
 
@@ -234,31 +239,17 @@ mod tests {
     /// A hole that is square within what is believed is fitted as one; one that leans by 5° is measured as it is.
     #[test]
     fn walls_that_lean_are_not_taken_for_square_ones() {
-        let scan = TriMesh::new(
-            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)],
-            vec![[0, 1, 2]],
-        );
-        let outline = Outline::new(&scan.unwrap(), &Point3::origin(), &Vector3::z_axis(), 5e-3).into();
-        let context = SearchContext {
-            params: PatternParams::default(),
-            pose_of: Isometry3::identity(),
-            lean: 1e-3,
-            height: 0.0,
-            touches: 0,
-            outline,
-            left_out: Vec::new(),
-        };
         let guess = Cylinder::new(Point3::origin(), &Vector3::z(), 4e-3, true);
-        let known = PatternParams::default().square.hypot(1e-3);
-        let (sigma, params) = context.squareness(&guess, &touches(0.5 * known), &LEAN);
+        let known = 2.5e-3;
+        let (sigma, params) = squareness(known, &guess, &touches(0.5 * known), &LEAN);
         assert_eq!((sigma, params.axis_sigma), (known, Some(known)));
         let leaning = touches(5f64.to_radians());
-        let (_, params) = context.squareness(&guess, &leaning, &LEAN);
+        let (_, params) = squareness(known, &guess, &leaning, &LEAN);
         assert_eq!(params.axis_sigma, None);
         let axis = fit(&guess, &leaning, &params).unwrap().surface.axis();
         let drawn = Vector3::new(5f64.to_radians().sin(), 0.0, 5f64.to_radians().cos());
         assert!(axis.cross(&drawn).norm() < 3e-3, "{axis:?}");
         // half of them: not enough to say so
-        assert_eq!(context.squareness(&guess, &leaning[..6], &LEAN).1.axis_sigma, Some(known));
+        assert_eq!(squareness(known, &guess, &leaning[..6], &LEAN).1.axis_sigma, Some(known));
     }
 }

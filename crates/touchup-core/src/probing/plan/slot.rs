@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
-use super::cylinder_fit::surface_about;
+use super::cylinder_fit::{squareness, surface_about};
 use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::hole::numbers;
@@ -23,7 +23,7 @@ use super::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHA
 use super::search_context::{AROUND, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::{RimStation, Slide, stadium_rim};
 use super::slot_fit::{CORNER, SlotFit};
-use crate::features::fit::{Ends, Freedom, Observation, Stadium, Surface, fit};
+use crate::features::fit::{Ends, FitParams, Freedom, Observation, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
 /// What may say that walls lean: both of them, across the slot. Along it only its ends would, and what was taken for one may be an obstacle.
@@ -126,9 +126,13 @@ impl SlotPattern {
         Stadium::new(centre, &context.out(), &along, [width, width + 2.0 * slot_fit.half], slot_fit.ends, true)
     }
 
+    fn squareness(&self, context: &SearchContext, walls: &Stadium) -> (f64, FitParams) {
+        squareness(context.square(context.lean), walls, &self.measuring.observations, &LEAN)
+    }
+
     fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
         let params = &context.params;
-        let (sigma, (lean, fit)) = (params.sigma, context.squareness(walls, &self.measuring.observations, &LEAN));
+        let (sigma, (lean, fit)) = (params.sigma, self.squareness(context, walls));
         let asked = Asked::default();
         let asked = match params.quantity {
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
@@ -154,7 +158,7 @@ impl SlotPattern {
     /// for none of these walls do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let (half, ball) = ((walls.length - walls.width).max(0.0) / 2.0, context.params.ball_radius);
-        let (_, params) = context.squareness(walls, &self.measuring.observations, &LEAN);
+        let (_, params) = self.squareness(context, walls);
         let fitted = fit(walls, &self.measuring.observations, &params).ok();
         let used = fitted.iter().flat_map(|fitted| &fitted.used);
         let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
@@ -402,7 +406,7 @@ impl Stage for SlotPattern {
         let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
         let walls = self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
-        let (_, params) = context.squareness(walls, &self.measuring.observations, &LEAN);
+        let (_, params) = self.squareness(context, walls);
         let fitted = fit(walls, &self.measuring.observations, &params)?;
         // where an end was not touched it has no length, and no middle
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
