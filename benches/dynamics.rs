@@ -12,7 +12,7 @@ fn main() {
 }
 
 const SAMPLES: usize = 1024;
-const RULES: [&str; 3] = ["lie", "corrected", "dp5"];
+const RULES: [&str; 4] = ["lie", "corrected", "bounded", "dp5"];
 const SPRING: ContactModel = ContactModel::Spring { stiffness_n_per_m: 1e4 };
 
 fn sigmoid(h_min_m: f64) -> ContactModel {
@@ -23,6 +23,7 @@ fn dynamics(rule: &str, model: ContactModel, along: Along) -> FaceDynamics {
     let rule = match rule {
         "lie" => StepRule::Lie,
         "corrected" => StepRule::DriftCorrected,
+        "bounded" => StepRule::Bounded,
         _ => StepRule::DormandPrince,
     };
     let params = DynamicsParams { model, rule, along, ..DynamicsParams::default() };

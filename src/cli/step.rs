@@ -2,7 +2,7 @@
 //! compared.
 //!
 //! In: `{"p_m","force_n","b_m","n","dt_s","h_min_m","delta","f_max_n","alpha_m_per_n_s","beta_per_n2_s",
-//! "step":"lie|corrected|dp5","along":"normal0|force"}`, vectors as arrays of three, all in one frame;
+//! "step":"lie|corrected|bounded|dp5","along":"normal0|force"}`, vectors as arrays of three, all in one frame;
 //! `k_n_per_m` instead of the three sigmoid values selects the linear spring. Out, in the same order:
 //! `{"b_m","n"}` with 17 digits, or `{"error"}`; a bad line does not end the run. No rigid-contact offset is taken out.
 

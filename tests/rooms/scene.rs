@@ -105,9 +105,6 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     let mut scene = Scene::default();
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::robust(tip)));
     scene.refine.as_mut().unwrap().mode = Mode::Paper;
-    let guard = Some(GuardParams::default());
-    assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams { guard, ..RefineParams::paper(tip) }));
-    scene.guard = None;
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(RefineParams::paper(tip)));
     let mut scene = Scene::default();
     scene.tip.as_mut().unwrap().ball.stiffness = None;
@@ -517,10 +514,10 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
                         patch, uncertainty, robot";
         format!("built: sync, contact, refine; left out: {left_out}")
     });
-    // the mode of the paper takes neither contact, sliding, carving nor a patch, whatever is named
+    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever is named
     let paper = built("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
-    assert!(paper.starts_with("built: tip, guard, refine; left out: sync"), "{paper}");
-    assert!(paper.ends_with("sliding, carve, patch, uncertainty, robot"), "{paper}");
+    assert!(paper.starts_with("built: tip, refine; left out: sync"), "{paper}");
+    assert!(paper.ends_with("sliding, carve, guard, patch, uncertainty, robot"), "{paper}");
 }
 
 /// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the next.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use nalgebra::{Point3, Vector3};
 
 use super::channels::{FeatureInput, LastTip, ViewInput};
-use super::convert::{NO_VECTOR, header, point, vector};
+use super::convert::{header, point, vector};
 use super::refinement::RefinementWorker;
 use super::replica::Edits;
 use crate::haptic::{Case, Mismatch, Update};
@@ -43,17 +43,19 @@ impl RefinementWorker {
         self.mismatch_ns = tip.stamp_ns;
         let centre = tip.pose_ot.translation.vector.into();
         let found = update.mismatch.as_ref();
-        let of = |part: fn(&Mismatch) -> Vector3<f64>| found.map_or(NO_VECTOR, |found| vector(&part(found)));
+        // without a face near nothing is expected, and what is felt is the mismatch
+        let actual_force = found.map_or(tip.force_o, |found| found.expected_force_o + found.linear);
+        let of = |part: fn(&Mismatch) -> Vector3<f64>| found.map_or_else(Vector3::zeros, part);
         let message = HapticMismatch {
             header: header(tip.stamp_ns, &self.setup.shared.frame),
             contact_case: number_of(update.case),
             face: found.map_or(HapticMismatch::NO_FACE, |found| found.face.0),
             mesh_version: self.session.version,
             tip: point(&centre),
-            actual_force: vector(&found.map_or(tip.force_o, |found| found.expected_force_o + found.linear)),
-            expected_force: of(|found| found.expected_force_o),
-            linear: of(|found| found.linear),
-            rotational: of(|found| found.rotational),
+            actual_force: vector(&actual_force),
+            expected_force: vector(&of(|found| found.expected_force_o)),
+            linear: vector(&found.map_or(actual_force, |found| found.linear)),
+            rotational: vector(&of(|found| found.rotational)),
             signed_distance: found.map_or(f64::NAN, |found| found.distance),
         };
         self.setup.shared.offer(&self.view, ViewInput::Mismatch(message));

@@ -135,7 +135,7 @@ robot.host '' -
 robot.site_packages '' -
 refine.mode robust robust,paper
 refine.contact_model - sigmoid,spring
-refine.step - lie,corrected,dp5
+refine.step - lie,corrected,bounded,dp5
 refine.along - normal0,force
 ";
 

@@ -39,6 +39,8 @@ impl Refiner {
         let Some(hit) = self.deformable.closest(&middle, hint, reach, &mut self.near_tip) else {
             return update;
         };
+        // before the face is moved
+        let mismatch = (update.case == Case::Free).then(|| self.mismatch_in_free_motion(ball, hit.face));
         let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);
         let first = if counts { self.penetration(&place.centre, &hit) } else { None };
         let mut fit = first.map(|inside| self.displace(&carve, hit.face, &inside, dt));
@@ -52,7 +54,7 @@ impl Refiner {
             }
         }
         match update.case {
-            Case::Free if fit.is_some() => Update { case: Case::MeshOnly, mismatch: None, fit },
+            Case::Free => Update { case: if fit.is_some() { Case::MeshOnly } else { Case::Free }, mismatch, fit },
             _ => update,
         }
     }

@@ -88,7 +88,7 @@ pub struct Mismatch {
     pub face: FaceId,
     /// h, signed distance of the ball's contact point from the face, m (Eq 1)
     pub distance: f64,
-    /// F*, N, in O (Eq 2)
+    /// F*, N, in O (Eq 2); none outside of the mesh, where a spring would pull
     pub expected_force_o: Vector3<f64>,
     /// ε_L = F − F*, N (Eq 4)
     pub linear: Vector3<f64>,
@@ -101,7 +101,8 @@ pub struct Mismatch {
 pub struct Update {
     /// which of the four cases
     pub case: Case,
-    /// at the touched face; `None` in free motion and beyond the reach
+    /// at the face that is touched or that the tip has entered; `None` where no face is within its reach: F* is zero there, and
+    /// ε_L the measured force
     pub mismatch: Option<Mismatch>,
     /// how the deformation ended; `None` when nothing was to be moved
     pub fit: Option<RegionFit>,
@@ -277,7 +278,15 @@ impl Refiner {
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
     fn press(&mut self, pressing: &Pressing, dt: f64) -> Result<Update, RefineError> {
         let mismatch = self.mismatch(pressing);
-        let case = if mismatch.distance < 0.0 { Case::Both } else { Case::SurfaceOnly };
+        // without a gate the surface is felt by more than what is expected at the face itself
+        let is_felt =
+            self.params.gate.is_some() || pressing.force_o.norm() > self.params.dynamics.model.force(0.0).max(0.0);
+        let case = match (mismatch.distance < 0.0, is_felt) {
+            (true, true) => Case::Both,
+            (false, true) => Case::SurfaceOnly,
+            (true, false) => Case::MeshOnly,
+            (false, false) => Case::Free,
+        };
         let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
         let face = &pressing.face;
         // without area a face has no normal; turned away from the measured normal it is another surface
@@ -339,15 +348,24 @@ impl Refiner {
     }
 
     fn mismatch(&self, pressing: &Pressing) -> Mismatch {
-        let distance = (pressing.point - pressing.face.b).dot(&pressing.face.n);
-        let expected = pressing.face.n * self.params.dynamics.model.force(distance);
+        let Pressing { handle, face: FaceState { b, n }, point, force_o, .. } = pressing;
+        let distance = (point - b).dot(n);
+        let expected = n * self.params.dynamics.model.force(distance).max(0.0);
         Mismatch {
-            face: pressing.handle,
+            face: *handle,
             distance,
             expected_force_o: expected,
-            linear: pressing.force_o - expected,
-            rotational: expected.cross(&pressing.force_o),
+            linear: force_o - expected,
+            rotational: expected.cross(force_o),
         }
+    }
+
+    /// Case 1 or 2 at a face that the tip is at or in, without contact.
+    fn mismatch_in_free_motion(&self, ball: &Ball, handle: FaceId) -> Mismatch {
+        let mesh = &self.deformable.mesh;
+        let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
+        let point = self.touching_point(ball.centre, &face.n);
+        self.mismatch(&Pressing { handle, face, normal: face.n, point, force_o: ball.force_o })
     }
 
     /// The rigid motion of the handle to its next state, as steps of its corners, m.

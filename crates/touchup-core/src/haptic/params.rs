@@ -163,7 +163,8 @@ impl RefineParams {
         }
     }
 
-    /// The published rule, taken literally: Eq 1–7 and 12 with a one-ring region, no gate, no correction, no guard.
+    /// The published rule, taken literally: Eq 6 and 7 solved together, Eq 12 and a one-ring region; no gate, no correction, no
+    /// guard, no limit.
     pub fn paper(tip: TipParams) -> Self {
         Self {
             gate: None,
@@ -171,6 +172,7 @@ impl RefineParams {
             touch_point: TouchPoint::FaceNormal,
             dynamics: DynamicsParams {
                 along: Along::InitialNormal,
+                rule: StepRule::Bounded,
                 take_out_rigid_offset: false,
                 ..DynamicsParams::default()
             },
@@ -179,6 +181,7 @@ impl RefineParams {
             guard: None,
             roi: RoiSize::OneRing,
             smallest_contact_cosine: -1.0,
+            longest_step_edges: f64::MAX,
             largest_move_edges: f64::MAX,
             ..Self::robust(tip)
         }

@@ -1,6 +1,6 @@
 //! Numerical stability: maps over twelve decades of every parameter, and the exact sub-flows against 32 digits.
 
-mod double_double;
+mod bounded_steps;
 mod face_runs;
 mod integrators;
 mod mesh_runs;
@@ -11,6 +11,7 @@ mod text;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
+pub use bounded_steps::{BoundedStepError, bounded_steps};
 pub use face_runs::RunEnding;
 pub use integrators::Integrator;
 pub use mesh_runs::BadShape;
@@ -70,6 +71,8 @@ pub struct Stability {
     pub meshes: Vec<MeshShares>,
     /// one for each sub-flow and regime
     pub sub_flows: Vec<SubFlowError>,
+    /// of the step with an error bound, one for each contact model and direction
+    pub bounded_steps: Vec<BoundedStepError>,
 }
 
 /// Runs all of it; the same numbers on every machine.
@@ -85,7 +88,9 @@ pub fn stability(effort: Effort, progress: &mut dyn FnMut(&str)) -> Stability {
     let meshes = BadShape::ALL.map(|shape| mesh_shares(shape, effort.choose(600, 8_000))).into();
     progress("exact sub-flows against 32 digits");
     let sub_flows = sub_flows::sub_flows(&mut Pcg64::seed_from_u64(SEED), effort.choose(300, 2_000));
-    Stability { faces: faces.into(), meshes, sub_flows }
+    progress("step with an error bound against 32 digits");
+    let bounded_steps = bounded_steps(SEED, effort.choose(50, 2_500));
+    Stability { faces: faces.into(), meshes, sub_flows, bounded_steps }
 }
 
 fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
@@ -133,6 +138,11 @@ impl Stability {
     /// The smallest altitude over longest side from which on no press of the default was at fault; `None` where all shapes are.
     pub fn default_stable_from_quality(&self) -> Option<f64> {
         self.meshes.iter().map(|shares| shares.stable_from_quality).reduce(|a, b| Some(a?.max(b?))).flatten()
+    }
+
+    /// Whether the step with an error bound kept it in every sample, and refused none.
+    pub fn is_bound_kept(&self) -> bool {
+        self.bounded_steps.iter().all(|group| group.refused == 0 && group.position <= 1.0 && group.normal <= 1.0)
     }
 
     /// The largest error of all sub-flows, over the scale.

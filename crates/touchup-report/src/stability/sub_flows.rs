@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use super::double_double::Double2;
 use super::face_runs::log_uniform;
+use crate::double_double::Double2;
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState};
 
 /// Halvings of the bracket: from 1e9 to below a rounding of what is left.

@@ -165,6 +165,7 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
     (params.compensator, params.scan_noise) = (compensator, scan_noise);
     match method {
         RefineMethod::PaperOde45 => params.dynamics.rule = StepRule::DormandPrince,
+        RefineMethod::PaperLie => params.dynamics.rule = StepRule::Lie,
         RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
         RefineMethod::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
         RefineMethod::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * tip.radius),

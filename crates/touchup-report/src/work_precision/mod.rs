@@ -3,7 +3,6 @@
 
 mod method;
 mod problem;
-mod reference;
 mod rosenbrock;
 mod text;
 
@@ -11,7 +10,6 @@ use std::hint::black_box;
 
 pub use method::{Method, Solved, SolverSetting};
 pub use problem::Problem;
-pub use reference::reference;
 
 use super::number::three_digits;
 use super::{Effort, Spread, timed};
@@ -100,7 +98,7 @@ impl WorkPrecision {
 /// `None` where there is nothing to compare with.
 fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<FaceCase> {
     let problem = Problem::of(h_min_m, tilt_deg.to_radians());
-    let right = reference(&problem)?;
+    let right = problem.held().reference()?.face;
     let travel_m = right.b.coords.norm();
     let floor_m = (REFERENCE_SHARE * h_min_m).max(REFERENCE_ROUNDINGS * f64::EPSILON * travel_m);
     let curve = |method: Method| {

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, Matrix4, Point3, Vector3, Vector4};
 
+use crate::reference::HeldFace;
 use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceState, StepRule};
 
 /// Travel along n*(0), m, and the normal.
@@ -68,6 +69,12 @@ impl Problem {
             along: Along::InitialNormal,
             take_out_rigid_offset: false,
         }
+    }
+
+    /// The same for the reference.
+    pub fn held(&self) -> HeldFace {
+        let Self { arm, force, normal, dt_s, .. } = *self;
+        HeldFace { params: self.params(StepRule::Bounded), normal, arm, force, dt_s }
     }
 
     /// The face at the start, its barycentre at the origin.

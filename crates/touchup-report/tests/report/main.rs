@@ -12,3 +12,6 @@ use touchup_report::allocations::CountingAllocator;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+#[path = "../../../../tests/common/full.rs"]
+mod full;

@@ -1,7 +1,9 @@
 //! The stability part of the report: what is promised of the default integrator holds, and what is known to fail is seen to.
 
 use touchup_report::Effort;
-use touchup_report::stability::{Integrator, RunEnding, stability};
+use touchup_report::stability::{Integrator, RunEnding, bounded_steps, stability};
+
+use super::full;
 
 #[test]
 fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
@@ -30,5 +32,19 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
     assert!(measured.default_stable_from_quality().is_some_and(|quality| quality < 0.1));
     for text in measured.chapter().text {
         println!("{text}");
+    }
+}
+
+/// 240 samples, 10,000 with --full; against collocation of order 13 in numbers of 32 digits.
+#[test]
+fn the_step_with_an_error_bound_keeps_it_however_stiff_the_sample_is() {
+    let cases = full::either(60, 2_500);
+    for group in bounded_steps(11, cases) {
+        println!("{group:?}");
+        assert_eq!(group.refused, 0, "{group:?}");
+        assert!(group.position <= 1.0 && group.normal <= 1.0, "{group:?}");
+        // nearly all have a path that numbers can follow
+        let left_out = group.without_reference + group.undetermined + group.ill_conditioned;
+        assert!(group.cases + group.without_reference == cases && 20 * left_out <= cases, "{group:?}");
     }
 }

@@ -2,9 +2,14 @@
 //! forms.
 
 use nalgebra::Vector3;
+use touchup_core::haptic::FaceState;
 use touchup_report::document::Report;
-use touchup_report::work_precision::{Method, PAPER_H_MIN_M, Problem, SolverSetting, WorkPrecision, reference};
+use touchup_report::work_precision::{Method, PAPER_H_MIN_M, Problem, SolverSetting, WorkPrecision};
 use touchup_report::{Drawing, Effort, TableCell};
+
+fn reference(problem: &Problem) -> Option<FaceState> {
+    problem.held().reference().map(|found| found.face)
+}
 
 /// A sample without friction at about half of f_max, so that u = h/h_min + δ has an elementary solution at exactly half.
 fn at_half_of_f_max(h_min_m: f64, from: f64) -> Problem {

@@ -65,7 +65,7 @@ impl Scene {
             ("scan.region", self.region().is_some()),
             ("sliding", self.sliding.is_some() && (is_robust || has_patch)),
             ("carve", self.carve.is_some() && (is_robust || has_patch)),
-            ("guard", self.guard.is_some() && self.refine.is_some()),
+            ("guard", self.guard.is_some() && is_robust),
             ("patch", has_patch),
             ("uncertainty", self.uncertainty.is_some() && has_patch),
             ("robot", self.robot.is_some()),

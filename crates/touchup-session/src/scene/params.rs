@@ -103,6 +103,7 @@ impl Scene {
             Mode::Paper => RefineParams::paper(self.tip_params()),
             Mode::Robust => RefineParams {
                 bias: self.bias_tracking,
+                guard: self.guard,
                 gate: self.contact,
                 sliding: self.sliding,
                 carve: self.carve,
@@ -113,7 +114,6 @@ impl Scene {
         if params.shape != TipShape::Ball {
             params.roi = RoiSize::Radius(TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()));
         }
-        params.guard = self.guard;
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan_noise();
         section.override_mut(&mut params);

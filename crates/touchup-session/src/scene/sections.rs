@@ -210,7 +210,7 @@ words! {
         /// What works on real scans.
         #[default]
         Robust = "robust",
-        /// The published rule, taken literally: no gate, no friction, no carving, whatever the scene names.
+        /// The published rule, taken literally: no gate, no friction, no carving, no guard, whatever the scene names.
         Paper = "paper",
     }
 }
@@ -230,8 +230,8 @@ parameters! {
     /// `refine`; a key that is left out is as the mode has it.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RefineSection in "refine" {
-        /// Which rule moves the mesh; paper: the published one taken literally, without contact, sliding, carve and patch whatever
-        /// is named; leave guard out too for its own sweeps.
+        /// Which rule moves the mesh; paper: the published one taken literally, without contact, sliding, carve, guard and patch
+        /// whatever is named.
         mode: Mode = Mode::Robust, "mode";
         /// Expected force over depth: the sigmoid of Eq 3, or the spring of the tip; left out: the spring where its stiffness is
         /// known.
@@ -242,7 +242,8 @@ parameters! {
         beta: Option<f64> = None, "beta_per_n2_s" [PER_N2_S, 0, 1e9] like "0.1";
         /// Robust: rate at which a face turns to the measured normal, whatever the force; takes the place of beta.
         turning: Option<f64> = None, "turning_per_s" [PER_S, 0, 1e6] like "30";
-        /// How the exact sub-flows of a step are put together; dp5: adaptive Runge–Kutta instead.
+        /// How position and normal are put together: one after the other (lie), with a correction (corrected), solved together to
+        /// 1e-9 (bounded, as with mode paper), or by adaptive Runge–Kutta (dp5).
         step: Option<StepRule> = None, "step" like "lie";
         /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or along the force.
         along: Option<Along> = None, "along" like "force";

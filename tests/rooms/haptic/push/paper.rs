@@ -1,5 +1,7 @@
 //! The published rule on one face: figures that follow from its equations alone.
 
+use touchup::haptic::Case;
+
 use super::*;
 
 /// h_min, δ, f_max, α of METHOD 1, in SI.
@@ -73,4 +75,29 @@ fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {
     let least = ALPHA * (10.5 - F_MAX) * 2.0;
     assert!(found > least && found < 2.0 * least, "{found} m");
     assert_eq!(refiner.counts().clamped, 2_001);
+}
+
+/// Fig 5: what is felt is more than f(0), what is expected is more than f(0) where the tip is in the face. F* and both mismatches
+/// are those of Eq 2, 4 and 5 in each case.
+#[test]
+fn all_four_cases_have_an_expected_force_and_both_mismatches() {
+    let at_face = F_MAX / (1.0 + DELTA.exp());
+    for (tip_z, force, case) in [
+        (1e-3, 0.9 * at_face, Case::Free),
+        (-1e-3, 0.9 * at_face, Case::MeshOnly),
+        (1e-3, 1.1 * at_face, Case::SurfaceOnly),
+        (-1e-3, 1.1 * at_face, Case::Both),
+    ] {
+        let mut refiner = one_face();
+        let felt = Vector3::new(0.6, 0.0, 0.8) * force;
+        let update = refiner.push(&sample(0, Point3::new(0.0, 0.0, tip_z), felt)).unwrap();
+        let mismatch = update.mismatch.unwrap();
+        let expected = Vector3::z() * (F_MAX / (1.0 + (tip_z / H_MIN + DELTA).exp()));
+        assert_eq!(update.case, case, "tip at {tip_z}, {force} N");
+        assert!(
+            (mismatch.distance - tip_z).abs() < 1e-15 && (mismatch.expected_force_o - expected).norm() < 1e-14 * F_MAX
+        );
+        assert!((mismatch.linear - (felt - expected)).norm() < 1e-14 * F_MAX);
+        assert!((mismatch.rotational - expected.cross(&felt)).norm() < 1e-14 * F_MAX);
+    }
 }

@@ -73,6 +73,17 @@ fn carving_moves_the_corners_of_one_face() {
         assert!(is_one_face, "{moved:?}");
         if !moved.is_empty() {
             assert_eq!(update.case, Case::MeshOnly);
+            // what the spring of 20 N/mm lets expect at the plane of the face that the tip is in, and nothing is felt
+            let mismatch = update.mismatch.unwrap();
+            let [a, b, c] = before.triangle(mismatch.face);
+            let n = (b - a).cross(&(c - a)).normalize();
+            let smoothed = refiner.contact().unwrap().ball.centre;
+            let h = (smoothed - n * RADIUS - Point3::from((a.coords + b.coords + c.coords) / 3.0)).dot(&n);
+            assert!(
+                (mismatch.distance - h).abs() < 1e-12
+                    && (mismatch.expected_force_o - n * (-2e4 * h).max(0.0)).norm() < 1e-6
+            );
+            assert!(mismatch.linear == -mismatch.expected_force_o && mismatch.rotational == Vector3::zeros());
             carved += 1;
         }
     }

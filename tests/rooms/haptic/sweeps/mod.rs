@@ -3,7 +3,7 @@
 //! `TOUCHUP_FULL=1` runs all seeds and sweeps; `--nocapture` or `--show-output` shows the numbers.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use touchup::haptic::{GuardParams, RefineCounts, RefineError, RefineParams, Refiner, TipParams};
+use touchup::haptic::{GuardParams, RefineCounts, RefineError, RefineParams, Refiner, StepRule, TipParams};
 use touchup::mesh::{FaceId, TriMesh};
 use touchup::sim::Peaks;
 use touchup::sim::coupled::GuidedStylus;
@@ -86,7 +86,8 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
     let truth = Peaks::default().mesh(10e-3).unwrap();
     let (mut inside, mut converged, mut blown_up) = (0, Vec::new(), 0);
     for seed in seeds {
-        let params = RefineParams { guard: None, ..RefineParams::paper(POINT) };
+        let mut params = RefineParams::paper(POINT);
+        params.dynamics.rule = StepRule::DriftCorrected;
         let mut refiner = Refiner::new(noisy(&truth, seed), params).unwrap();
         let (mut stamp_ns, mut farthest) = (0, 0.0f64);
         let start = MeshErrors::by_index(refiner.mesh(), &truth).distance_mm;

@@ -118,6 +118,15 @@ impl ContactModel {
         }
     }
 
+    /// The derivative of [`Self::distance`], m/N; zero where that is infinite.
+    pub(super) fn distance_slope(&self, force_n: f64) -> f64 {
+        match *self {
+            Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 || force_n >= f_max_n => 0.0,
+            Self::Sigmoid { f_max_n, h_min_m, .. } => -h_min_m * (1.0 / (f_max_n - force_n) + 1.0 / force_n),
+            Self::Spring { stiffness_n_per_m } => -1.0 / stiffness_n_per_m,
+        }
+    }
+
     /// Whether F·n is more than the model can answer: [`Self::rigid_offset`], and a step that takes the offset out,
     /// then use [`LARGEST_SHARE`] · f_max instead; a step that does not lets the face escape.
     pub fn clamps(&self, force_n: f64) -> bool {

@@ -59,7 +59,7 @@ pub fn integrate(
         let change = if error.is_finite() { SAFETY * error.powf(-0.2) } else { CHANGE.0 };
         step = dt * change.clamp(CHANGE.0, CHANGE.1);
     }
-    Err(DynamicsError::Stiff { steps: MAX_STEPS, reached_s: time, dt_s: end })
+    Err(DynamicsError::Stiff { rule: "dp5", steps: MAX_STEPS, reached_s: time, dt_s: end })
 }
 
 /// Fills `k` and returns the fifth-order result, whose rate is `k[6]`.

@@ -29,9 +29,20 @@ pub enum DynamicsError {
         /// s
         dt_s: f64,
     },
-    /// The explicit solver gave up.
-    #[error("too stiff for dp5: {steps} steps reached {reached_s} s of {dt_s} s; use lie or corrected")]
+    /// The face turned so far that its rest point repels it.
+    #[error(
+        "the step has no answer within its bound: what roundings grow to on the way is {share:.1e} of it; take a shorter step, \
+         or a force nearer to the normal"
+    )]
+    Undetermined {
+        /// what roundings come to, over the bound
+        share: f64,
+    },
+    /// An adaptive solver gave up.
+    #[error("too stiff for {rule}: {steps} steps reached {reached_s} s of {dt_s} s; use lie or corrected")]
     Stiff {
+        /// as in the scene and in `touchup step`
+        rule: &'static str,
         /// tried
         steps: usize,
         /// s

@@ -11,15 +11,17 @@
 //!   face adds a drift v to dh/dt, frozen as well.
 //! - **rotation**, the impulse J = ∫ f dt given: n turns towards F by tan(θ/2) → tan(θ/2) e^(−β|F|J).
 //!
-//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution, whatever dt.
+//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution, whatever dt; elsewhere
+//! [`StepRule::Bounded`] solves both together to [`RELATIVE_ERROR`].
 
+mod bounded;
 mod contact_model;
 pub mod dormand_prince;
 mod error;
 mod rotation;
 mod sigmoid_flow;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::{parameters, words};
 
@@ -30,6 +32,11 @@ pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
+/// Largest error of [`StepRule::Bounded`]: of the position over the farthest travel, of the normal over 1. Where the roundings of
+/// the input do more than that, they decide.
+pub const RELATIVE_ERROR: f64 = 1e-9;
+/// An impulse (times α) that turns a face by one is no larger, m: beyond it the face does not turn.
+const NO_TURNING: f64 = 1e100;
 /// Squares below it have lost digits.
 const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 /// Below it the weight of the end is 1/2 + z/12 to rounding.
@@ -53,6 +60,8 @@ words! {
         Lie = "lie",
         /// The position flow again with the drift and the mean normal that the rotation causes: second order.
         DriftCorrected = "corrected",
+        /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, a thousand times the cost.
+        Bounded = "bounded",
         /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
         DormandPrince = "dp5",
     }
@@ -175,7 +184,7 @@ impl FaceDynamics {
     ///
     /// # Errors
     /// Input that is not finite, a normal that is not of length 1, a negative `dt`, a result that overflows, and
-    /// [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`].
+    /// [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`] and [`StepRule::Bounded`], and [`DynamicsError::Undetermined`] from the latter.
     pub fn step(
         &self,
         face: &FaceState,
@@ -216,6 +225,7 @@ impl FaceDynamics {
         let (displacement, n) = match self.params.rule {
             StepRule::Lie => self.lie(&touch),
             StepRule::DriftCorrected => self.drift_corrected(&touch),
+            StepRule::Bounded => self.bounded(&touch)?,
             StepRule::DormandPrince => self.dormand_prince(&touch)?,
         };
         let b = face.b + displacement * along;
@@ -285,6 +295,55 @@ impl FaceDynamics {
             ..start
         };
         (self.params.model.flow(&hold), (0.5 - weight) * (force - start.force) * touch.dt)
+    }
+
+    /// Both flows at once; a face that does not turn has the exact solution of [`Self::lie`].
+    fn bounded(&self, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
+        let turning = self.params.beta_per_n2_s * touch.magnitude;
+        let (displacement, end) = self.lie(touch);
+        if turning == 0.0 || touch.dt == 0.0 || end == touch.n && touch.n.cross(&touch.towards).norm() <= f64::EPSILON {
+            return Ok((displacement, end));
+        }
+        let (model, alpha) = (&self.params.model, self.params.alpha_m_per_n_s);
+        let (contact, shift) = match *model {
+            ContactModel::Sigmoid { h_min_m, delta, .. } => (h_min_m, (h_min_m * delta).abs()),
+            ContactModel::Spring { stiffness_n_per_m } => {
+                (self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m, 0.0)
+            }
+        };
+        let rounding = 8.0 * f64::EPSILON * (touch.arm.norm() + shift);
+        // the impulse times α is a length, as the travel is
+        let unit = if alpha > 0.0 { alpha } else { 1.0 };
+        let normal = |impulse: f64| turn(&touch.n, &touch.towards, turning / unit * impulse);
+        let slope = |y: &bounded::Coupled| {
+            let n = normal(y.y);
+            let turned = turning / unit * (touch.towards - touch.towards.dot(&n) * n);
+            let (force, h) = self.compared(&n, touch, y.x);
+            let mut force_slope = touch.magnitude * touch.towards.dot(&turned);
+            let mut by_impulse = (touch.arm - y.x * touch.along).dot(&turned);
+            if self.params.take_out_rigid_offset {
+                if force != touch.magnitude * touch.towards.dot(&n) {
+                    force_slope = 0.0;
+                }
+                by_impulse += model.distance_slope(force) * force_slope;
+            }
+            let (expected, stiffness) = (model.force(h), model.slope(h));
+            let by_travel = -touch.along.dot(&n);
+            bounded::Slope {
+                rate: Vector2::new(alpha * (force - expected), unit * expected),
+                jacobian: Matrix2::new(
+                    -alpha * stiffness * by_travel,
+                    alpha * (force_slope - stiffness * by_impulse),
+                    unit * stiffness * by_travel,
+                    unit * stiffness * by_impulse,
+                ),
+            }
+        };
+        // of a force that turns the face by nothing
+        let turned = (unit / turning).min(NO_TURNING);
+        let sizes = bounded::Sizes { rounding, turning: turned, contact };
+        let y = bounded::integrate(touch.dt, sizes, RELATIVE_ERROR, slope)?;
+        Ok((y.x, normal(y.y)))
     }
 
     fn dormand_prince(&self, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {

@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// high + low, |low| ≤ half a rounding of high
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Double2 {
+pub(crate) struct Double2 {
     pub high: f64,
     pub low: f64,
 }
@@ -108,6 +108,17 @@ impl Double2 {
         y
     }
 
+    /// Square root; of a number that is not negative.
+    pub fn sqrt(self) -> Self {
+        let root = self.high.sqrt();
+        if root == 0.0 {
+            return Self::from(0.0);
+        }
+        // one step of Newton's method doubles the digits
+        let near = Self::from(root);
+        near + Self::from((self - near * near).high / (2.0 * root))
+    }
+
     /// The nearest double.
     pub fn value(self) -> f64 {
         self.high + self.low
@@ -128,6 +139,8 @@ mod tests {
         assert!(off(Double2::from(10.0).ln(), std::f64::consts::LN_10, -2.170_756_223_382_249e-16) < 1e-30);
         let third = Double2::from(1.0) / 3.0.into();
         assert!((third * 3.0.into() - 1.0.into()).value().abs() < 1e-31);
+        // √2 = 1.41421356237309504880168872420969807…
+        assert!(off(Double2::from(2.0).sqrt(), std::f64::consts::SQRT_2, -9.667_293_313_452_913e-17) < 1e-31);
     }
 
     #[test]
