@@ -104,7 +104,7 @@ enum ReportChapter {
     WorkPrecision,
     /// Error against time of each method to refine whole scans, with two baselines
     WholeScan,
-    /// Error from sweep to sweep
+    /// Error from sweep to sweep, and of one face over time
     Convergence,
     /// Where each integrator stays stable, and what becomes of extremes
     Stability,

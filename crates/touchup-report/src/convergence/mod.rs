@@ -3,16 +3,18 @@
 
 mod decay;
 mod errors;
+mod one_face;
 mod sweeps;
 mod text;
 
 pub use decay::{Decay, Line, fit_decay, straight_line};
 pub use errors::MeshErrors;
+pub use one_face::{OneFaceRun, OneFaceSample};
 pub(super) use sweeps::region_over;
 pub use sweeps::{BLOWN_UP, PaperSweeps, RobustSweeps, noisy, raster_samples};
 
 use super::Effort;
-use super::error::Measured;
+use super::error::{MeasureError, Measured};
 use touchup_core::names;
 use touchup_core::stylus::Sample;
 use touchup_sim::Peaks;
@@ -54,6 +56,8 @@ pub struct Convergence {
     pub sweeps: usize,
     /// each scan with each rule
     pub runs: Vec<SweepRun>,
+    /// one face from three starts
+    pub one_face: Vec<OneFaceRun>,
     /// a rule that could not be set up, in words
     pub failed: Vec<String>,
 }
@@ -63,6 +67,8 @@ const PAPER_EDGE: f64 = 10e-3;
 const ROBUST_EDGE: f64 = 5e-3;
 /// Seed of the first scan: its error at the start is the paper's.
 const FIRST_SEED: u64 = 3;
+/// One face is at rest after it, s.
+const ONE_FACE_S: usize = 40;
 /// Friction of the raster.
 const FRICTION: f64 = 0.15;
 /// A law is not fitted to less sweeps.
@@ -121,8 +127,12 @@ pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergenc
             robust_run(&peaks, &samples, seed, sweeps)
         })),
     }
-    let failed = runs.iter().filter_map(|run| Some(run.as_ref().err()?.to_string())).collect();
-    Convergence { sweeps, runs: runs.into_iter().flatten().collect(), failed }
+    progress("convergence: one face");
+    let one_face = one_face::one_face_runs(ONE_FACE_S);
+    let why = |error: &MeasureError| error.to_string();
+    let failed = runs.iter().filter_map(|run| run.as_ref().err().map(why)).chain(one_face.as_ref().err().map(why));
+    let failed = failed.collect();
+    Convergence { sweeps, runs: runs.into_iter().flatten().collect(), one_face: one_face.unwrap_or_default(), failed }
 }
 
 fn paper_run(seed: u64, sweeps: usize) -> Measured<SweepRun> {

@@ -1,9 +1,11 @@
 //! Convergence as a chapter of the report.
 
-use super::{Convergence, Decay, MeshErrors, Rule, SweepRun};
+use super::{Convergence, Decay, MeshErrors, OneFaceRun, OneFaceSample, Rule, SweepRun};
 use crate::number::range;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Table};
 
+/// Errors of one face below it are roundings.
+const DRAWN_FROM: f64 = 1e-12;
 /// Points of a drawn law between two sweeps.
 const STEPS: usize = 8;
 
@@ -13,8 +15,12 @@ impl Convergence {
         let mut text = vec![self.introduction()];
         text.extend(Rule::ALL.into_iter().map(|rule| self.verdict(rule)));
         text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
-        let figures = Rule::ALL.map(|rule| self.figure(rule)).into();
-        Chapter::of("Convergence from sweep to sweep", text, figures, vec![self.table()])
+        text.extend(self.one_face.iter().map(one_face_text));
+        let mut figures: Vec<Figure> = Rule::ALL.map(|rule| self.figure(rule)).into();
+        if !self.one_face.is_empty() {
+            figures.extend([self.one_face_paths(), self.one_face_distances(), self.one_face_normals()]);
+        }
+        Chapter::of("Convergence from sweep to sweep, and of one face", text, figures, vec![self.table()])
     }
 
     fn introduction(&self) -> String {
@@ -84,6 +90,55 @@ impl Convergence {
             ))
     }
 
+    /// Fig 6.
+    fn one_face_paths(&self) -> Figure {
+        let series = self.one_face.iter().flat_map(|run| {
+            let path = |of: fn(&OneFaceSample) -> [f64; 3]| {
+                run.samples.iter().map(move |sample| Mark::at(of(sample)[0], of(sample)[2]))
+            };
+            [
+                Series::new(
+                    format!("{}, b*", one_face_name(run)),
+                    LineStroke::Joined,
+                    path(|sample| sample.barycentre_mm),
+                ),
+                Series::new(format!("{}, tip", one_face_name(run)), LineStroke::Dashed, path(|sample| sample.tip_mm)),
+            ]
+        });
+        Figure::of("one_face_path", Drawing::Curves(series.collect()))
+            .title("One face: barycentre and tip, seen from the side")
+            .axes(Axis::linear("x, mm", "x_mm"), Axis::linear("z, mm", "z_mm"))
+            .caption(
+                "The paper's Fig 6: the true plane is z = 0. b* goes straight along n*(0), and comes to rest in the plane but not \
+                 where the true barycentre is.",
+            )
+    }
+
+    /// Fig 7, upper half.
+    fn one_face_distances(&self) -> Figure {
+        self.one_face_errors("one_face_distance", "distance error, mm", "distance_error_mm", |sample| {
+            sample.distance_mm
+        })
+        .title("One face: distance between the planes")
+        .caption("The paper's Fig 7: |(b* - b)·n|. It is corrected first. Errors below 1e-12 are drawn there.")
+    }
+
+    /// Fig 7, lower half.
+    fn one_face_normals(&self) -> Figure {
+        self.one_face_errors("one_face_normal", "normal deviation, degrees", "normal_deg", |sample| sample.normal_deg)
+            .title("One face: angle between the normals")
+            .caption("The paper's Fig 7, as an angle: |n* x n| would be zero for a face that is turned over. It waits for the distance.")
+    }
+
+    fn one_face_errors(&self, id: &str, label: &str, column: &str, error: fn(&OneFaceSample) -> f64) -> Figure {
+        let series = self.one_face.iter().map(|run| {
+            let marks = run.samples.iter().map(|sample| Mark::at(sample.time_s, error(sample).max(DRAWN_FROM)));
+            Series::new(one_face_name(run), LineStroke::Dashed, marks)
+        });
+        Figure::of(id, Drawing::Curves(series.collect()))
+            .axes(Axis::linear("time, s", "time_s"), Axis::log(label, column))
+    }
+
     fn table(&self) -> Table {
         let error_at = |sweep: usize| move |run: &SweepRun| Some(run.errors.get(sweep)?.distance_mm);
         let last = |of: fn(&MeshErrors) -> f64| move |run: &SweepRun| run.errors.last().map(of);
@@ -108,6 +163,22 @@ impl Convergence {
                  that blew up has no fit, and ends where its error was twice that of its start.",
             )
     }
+}
+
+fn one_face_name(run: &OneFaceRun) -> String {
+    format!("leaning {} degrees", run.tilt_deg)
+}
+
+/// When which error is down to a tenth, and what is left at the end.
+fn one_face_text(run: &OneFaceRun) -> String {
+    let tenth = |error: fn(&OneFaceSample) -> f64| {
+        run.time_to_share(0.1, error).map_or("not within the run".to_owned(), |time_s| format!("after {time_s:.2} s"))
+    };
+    let (distance, normal) = (tenth(|sample| sample.distance_mm), tenth(|sample| sample.normal_deg));
+    let left = run.samples.last().map_or(String::new(), |last| {
+        format!("; after {:.0} s {:.1e} mm and {:.1e} degrees are left", last.time_s, last.distance_mm, last.normal_deg)
+    });
+    format!("One face, {}: the distance is down to a tenth {distance}, the angle {normal}{left}.", one_face_name(run))
 }
 
 /// Both laws, from sweep 1 to the last.

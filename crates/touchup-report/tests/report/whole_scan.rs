@@ -6,7 +6,7 @@ use touchup_core::compare::TouchedRegion;
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh, VertexId};
 use touchup_core::stylus::{CompensatorParams, Sample, Wrench};
-use touchup_report::convergence::{Rule, convergence, fit_decay, straight_line};
+use touchup_report::convergence::{OneFaceSample, Rule, convergence, fit_decay, straight_line};
 use touchup_report::error::MeasureError;
 use touchup_report::whole_scan::{
     ContactSculptor, GaussianParams, GaussianProcess, GaussianSurface, GivenPart, RefineMethod, TouchedError,
@@ -286,6 +286,26 @@ fn convergence_is_measured_and_reported() {
     chapter.text.iter().for_each(|text| println!("{text}\n"));
     check_chapter(&chapter);
     assert_eq!(chapter.tables[0].rows.len(), found.runs.len());
+}
+
+/// Fig 6 and 7: b* stays on the line of n*(0), the distance falls before the angle, and both come to zero.
+#[test]
+fn one_face_goes_along_its_first_normal_and_corrects_the_distance_before_the_angle() {
+    let found = convergence(QUICK, &mut |_| {});
+    assert_eq!(found.one_face.len(), 3);
+    for run in &found.one_face {
+        let [first, last] = [&run.samples[0], &run.samples[run.samples.len() - 1]];
+        let tenth = |error: fn(&OneFaceSample) -> f64| run.time_to_share(0.1, error).unwrap();
+        // at rest a face that leans more draws the tip farther aside, so that the distance waits for the angle
+        if run.tilt_deg <= 20.0 {
+            assert!(tenth(|sample| sample.distance_mm) < 0.7 * tenth(|sample| sample.normal_deg), "{}", run.tilt_deg);
+        }
+        assert!(last.distance_mm < 1e-6 && last.normal_deg < 1e-3, "{last:?}");
+        // along n*(0): aside by as much as the tangent of its lean
+        let step = [0, 1, 2].map(|i| last.barycentre_mm[i] - first.barycentre_mm[i]);
+        let aside = step[0].hypot(step[1]);
+        assert!((aside - step[2].abs() * run.tilt_deg.to_radians().tan()).abs() < 1e-9, "{step:?}");
+    }
 }
 
 /// Tables are as wide as their heads, figures have marks, and no two have one name.
