@@ -76,9 +76,10 @@ fn one_face(b_mm: [f64; 3], tilt_deg: f64, azimuth_deg: f64, seconds: usize) -> 
 }
 
 impl OneFaceRun {
-    /// When an error has come down to a share of its start, s; `None` where it does not.
+    /// From when on an error stays below a share of its start, s; `None` where it does not.
     pub fn time_to_share(&self, share: f64, error: impl Fn(&OneFaceSample) -> f64) -> Option<f64> {
         let first = self.samples.first().map(&error)?;
-        self.samples.iter().find(|sample| error(sample) <= share * first).map(|sample| sample.time_s)
+        let above = self.samples.iter().rposition(|sample| error(sample) > share * first)?;
+        self.samples.get(above + 1).map(|sample| sample.time_s)
     }
 }

@@ -120,7 +120,8 @@ impl Convergence {
             sample.distance_mm
         })
         .title("One face: distance between the planes")
-        .caption("The paper's Fig 7: |(b* - b)·n|. It is corrected first. Errors below 1e-12 are drawn there.")
+        .caption("The paper's Fig 7: |(b* - b)·n|. The face passes the plane within half a second; while it leans, it draws the tip aside and \
+                 rests off the plane, and comes back as the normal turns. Errors below 1e-12 are drawn there.")
     }
 
     /// Fig 7, lower half.
@@ -178,7 +179,10 @@ fn one_face_text(run: &OneFaceRun) -> String {
     let left = run.samples.last().map_or(String::new(), |last| {
         format!("; after {:.0} s {:.1e} mm and {:.1e} degrees are left", last.time_s, last.distance_mm, last.normal_deg)
     });
-    format!("One face, {}: the distance is down to a tenth {distance}, the angle {normal}{left}.", one_face_name(run))
+    format!(
+        "One face, {}: the distance is down to a tenth for good {distance}, the angle {normal}{left}.",
+        one_face_name(run)
+    )
 }
 
 /// Both laws, from sweep 1 to the last.
