@@ -178,9 +178,6 @@ fn size(feature: &Feature) -> String {
         Some(true) => parts.push("through".to_owned()),
         _ => part("deep ", &feature.depth),
     }
-    if feature.kind == Kind::Hole && feature.through.is_none() && feature.depth.is_some() {
-        parts.push("or more".to_owned());
-    }
     if let Some(cone) = &feature.cone_angle {
         parts.push(format!("countersunk {:.1}°", cone.value.to_degrees()));
     }
@@ -189,5 +186,6 @@ fn size(feature: &Feature) -> String {
 
 fn with_std(measured: &Measured<f64>) -> String {
     let std = measured.std.map_or_else(String::new, |std| format!(" ± {:.3}", std * 1e3));
-    format!("{:.3}{std}", measured.value * 1e3)
+    let bound = if measured.is_at_least { "≥ " } else { "" };
+    format!("{bound}{:.3}{std}", measured.value * 1e3)
 }

@@ -68,10 +68,9 @@ fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a F
 
 /// What the drawing says of a feature, beside what was found.
 fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
-    let is_boss = matches!(truth.shape, TruthShape::Boss { .. });
     let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
         let std = record.and_then(|record| record.std.get(name).copied());
-        let is_lower_bound = name == "depth_mm" && !is_boss && record.is_some() && std.is_none();
+        let is_lower_bound = record.is_some_and(|record| record.at_least.iter().any(|bound| bound == name));
         FoundNumber { name, truth: truth * 1e3, found: record.and_then(value), std, is_lower_bound }
     };
     let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
@@ -152,7 +151,7 @@ impl fmt::Display for FoundNumber {
         let Some(found) = self.found else { return write!(f, "{truth:>22} {:>26} {:>10}", "not measured", "") };
         let shown = match self.std {
             Some(std) => format!("{found:.3} ± {std:.3}"),
-            None if self.is_lower_bound => format!("≥ {found:.3}, floor not touched"),
+            None if self.is_lower_bound => format!("≥ {found:.3}, no farther touched"),
             None => format!("{found:.3} (not touched)"),
         };
         write!(f, "{truth:>22} {shown:>26} {:>10}", format!("{:+.3}", found - self.truth))

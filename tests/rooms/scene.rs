@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::vector;
 use proptest::prelude::*;
-use touchup::haptic::{Along, ContactModel, DynamicsParams, GuardParams, RefineParams, RoiSize, StepRule, TipParams};
+use touchup::haptic::{Along, ContactModel, DynamicsParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::io::mesh_file::MeshUnit;
 use touchup::reconstruct::PatcherParams;
 use touchup::scene::{

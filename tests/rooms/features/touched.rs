@@ -3,11 +3,12 @@
 //!
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` or `--show-output` shows the numbers.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use touchup::features::{Feature, FittedTo, Kind, Measured, detect};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
+use touchup::stylus::ProbedPoint;
 
 use crate::full::either;
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
@@ -249,4 +250,53 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
         outside += usize::from((after.0 - true_width).abs() > 2.0 * after.1);
     }
     assert!(compared == 4 && outside >= 3, "{outside} of {compared} outside of two standard deviations");
+}
+
+/// The plate as drawn, with its surface around the blind hole and the upper 3 mm of its wall touched: how deep it is nobody felt,
+/// and what was not touched has no uncertainty beside what was. Without touches the drawing is known to its rounding.
+#[test]
+fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
+    let plate = Plate::default();
+    let mesh = plate.mesh(5e-6).unwrap();
+    let truth = plate.features().into_iter().find(|truth| truth.name.contains("blind")).unwrap();
+    let TruthShape::Hole { diameter, depth: drawn_depth, .. } = truth.shape else { panic!("a hole") };
+    let (centre, top, radius) = (truth.centre, truth.centre.z, diameter / 2.0);
+    let touch = |point: Point3<f64>, normal: Vector3<f64>, number: i64| ProbedPoint {
+        point,
+        normal,
+        centre: point + normal * 1.5e-3,
+        radius: 1.5e-3,
+        sigma: 0.02e-3,
+        weight: 1.0,
+        calibration: 2e-6,
+        stroke: number as u32,
+        stamp_ns: number * 1_000_000_000,
+        is_rejected: false,
+    };
+    let felt = 3e-3;
+    let mut touches = Vec::new();
+    for i in 0..40 {
+        let (sine, cosine) = (f64::from(i) * std::f64::consts::TAU / 40.0).sin_cos();
+        let at = |from_axis: f64, depth: f64| {
+            Point3::new(centre.x + from_axis * cosine, centre.y + from_axis * sine, top - depth)
+        };
+        let number = touches.len() as i64;
+        touches.push(touch(at(radius + 2e-3, 0.0), Vector3::z(), number));
+        let inward = -Vector3::new(cosine, sine, 0.0);
+        touches.push(touch(at(radius, felt * f64::from(i % 4) / 3.0), inward, number + 1));
+    }
+    let tree = FaceTree::new(&mesh);
+    let of = |touches: &[ProbedPoint]| detect(&mesh, &tree, touches).features;
+    let depth = |features: &[Feature]| of_truth(&truth, Kind::Hole, features).depth.clone().unwrap();
+    let drawn = depth(&of(&[]));
+    assert!(!drawn.is_at_least && (drawn.value - drawn_depth).abs() < 1e-6 && drawn.std.is_some());
+    let touched = of(&touches);
+    let bound = depth(&touched);
+    assert!(bound.is_at_least && bound.std.is_none() && (bound.value - felt).abs() < 0.05e-3, "{bound:?}");
+    for feature in touched.iter().filter(|feature| feature.fitted_to == FittedTo::Mesh) {
+        let axis = feature.axis.as_ref().and_then(|axis| axis.std);
+        assert!(feature.centre.std.is_none() && axis.is_none(), "{feature:?}");
+    }
+    let is_known = |feature: &&Feature| feature.fitted_to == FittedTo::Touches && feature.centre.std.is_some();
+    assert_eq!(touched.iter().filter(is_known).count(), 2, "the hole and the surface around it");
 }

@@ -97,7 +97,18 @@ type AxisEnd = Measured<Point3<f64>>;
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
     let touches = distinct(from.touches.iter().chain(&to.touches).copied());
-    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches }
+    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches, is_at_least: false }
+}
+
+/// From the end that was felt to the other one; as far as the wall was felt where that other end was not: it may be a guess.
+fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd, out: &Vector3<f64>) -> Measured<f64> {
+    if fitted.to == FittedTo::Mesh || !to.touches.is_empty() {
+        return between(from, to, out);
+    }
+    let side = (to.value - from.value).dot(out).signum();
+    let along = |&number: &u32| (measure.observed.touch(number).point - from.value).dot(out) * side;
+    let value = fitted.touches.iter().map(along).fold(0.0, f64::max);
+    Measured { value, std: None, touches: fitted.touches.clone(), is_at_least: true }
 }
 
 impl AxisEnd {
@@ -110,15 +121,9 @@ impl AxisEnd {
     /// As the place of a feature with a fitted surface.
     ///
     /// - `std`: of the place, from the fit, m.
-    fn centre<S>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Self {
+    fn centre<S: Surface>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Self {
         let touches = distinct(fitted.touches.iter().chain(&self.touches).copied());
-        Self { value: self.value, std: fitted.fit.as_ref().and_then(std), touches }
-    }
-
-    /// Beside numbers that were touched, the uncertainty of the mesh means nothing: no touch confirms it.
-    fn known_as(self, to: FittedTo) -> Self {
-        let is_known = to == FittedTo::Mesh || !self.touches.is_empty();
-        Self { std: self.std.filter(|_| is_known), ..self }
+        Self { value: self.value, std: fitted.confirmed().and_then(std), touches, is_at_least: false }
     }
 }
 
@@ -128,7 +133,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let axis = fitted.axis(&hole.out);
     let opening = AxisEnd::on(measure, hole.rim, &fitted.surface.nearest_on_axis(&hole.opening), &axis.value);
     let bottom = fitted.surface.nearest_on_axis(&(hole.opening - hole.out * hole.depth));
-    let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value).known_as(fitted.to);
+    let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value);
     // beside a wall that was touched, a floor that was not may be a guess
     let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
     let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.value));
@@ -136,7 +141,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        depth: Some(between(&opening, &floor, &axis.value)),
+        depth: Some(extent(measure, &fitted, &opening, &floor, &axis.value)),
         axis: Some(axis),
         through: hole.through.filter(|_| is_known),
         walls: Some(Walls::Round(fitted.surface)),
@@ -158,9 +163,10 @@ fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
 
 /// A hole of which there is no wall: how deep it is and whether it goes through is not known.
 fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
-    let (surface, fit) = (rim.fit.surface, Some(rim.fit.clone()));
-    let fitted = Fitted { surface, fit, touches: Vec::new(), to: FittedTo::Mesh };
-    let centre = Measured { value: rim.centre, std: rim.fit.lateral_std(&rim.centre), touches: Vec::new() };
+    let (surface, fit, is_confirmed) = (rim.fit.surface, Some(rim.fit.clone()), !measure.observed.has_touches());
+    let fitted = Fitted { surface, fit, touches: Vec::new(), to: FittedTo::Mesh, is_confirmed };
+    let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&rim.centre));
+    let centre = Measured { value: rim.centre, std, touches: Vec::new(), is_at_least: false };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
@@ -175,11 +181,11 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let foot = fitted.surface.nearest_on_axis(&boss.foot);
     let foot = AxisEnd::on(measure, Some(boss.base), &foot, &axis.value);
     let top = fitted.surface.nearest_on_axis(&(boss.foot + boss.out * boss.height));
-    let top = AxisEnd::on(measure, boss.top, &top, &axis.value).known_as(fitted.to);
+    let top = AxisEnd::on(measure, boss.top, &top, &axis.value);
     let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.value));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        depth: Some(between(&top, &foot, &axis.value)),
+        depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(fitted.surface)),
         ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
@@ -200,15 +206,15 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
-    let floor = AxisEnd::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value).known_as(fitted.to);
+    let floor = AxisEnd::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value);
     let centre = opening.centre(&fitted, Fit::middle_std);
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };
     let half = direction * (length / 2.0);
     let touched = measure.observed.touched_share(&slot.walls);
-    let depth = if slot.through {
+    let depth = if slot.through && fitted.to == FittedTo::Mesh {
         Measured { value: slot.depth, ..Measured::default() }
     } else {
-        between(&opening, &floor, &axis.value)
+        extent(measure, &fitted, &opening, &floor, &axis.value)
     };
     Feature {
         direction: Some(direction),
@@ -232,7 +238,7 @@ fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
 fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     let [a, b] = edge.planes.map(|number| measure.plane(number));
     let (a, b) = (a?, b?);
-    let std_at = |side: usize, point: &Point3<f64>| [&a, &b][side].fit.as_ref()?.std_at(point);
+    let std_at = |side: usize, point: &Point3<f64>| [&a, &b][side].confirmed()?.std_at(point);
     let touches = distinct(a.touches.iter().chain(&b.touches).copied());
     let (axis, _, found) = Feature::crossing([&a.surface, &b.surface], std_at, &edge.ends, edge.is_convex, touches)?;
     let touched = measure.observed.touched_along(&[found.points[0], found.points[1]]);
@@ -275,7 +281,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let inverse = normals.try_inverse()?;
     let heights = Vector3::from_fn(|i, _| planes[i].surface.normal().dot(&planes[i].surface.point().coords));
     let point = Point3::from(inverse * heights);
-    let stds = [0, 1, 2].map(|i| planes[i].fit.as_ref().and_then(|fit| fit.std_at(&point)));
+    let stds = [0, 1, 2].map(|i| planes[i].confirmed().and_then(|fit| fit.std_at(&point)));
     let std = if let [Some(s), Some(t), Some(u)] = stds {
         let heights = Matrix3::from_diagonal(&Vector3::new(s * s, t * t, u * u));
         Some((inverse * heights * inverse.transpose()).trace().sqrt())
@@ -285,7 +291,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let touches = distinct(planes.iter().flat_map(|plane| plane.touches.iter().copied()));
     let touched = measure.observed.touched_along(&[point, point]);
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
-    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches }, touched, to))
+    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches, is_at_least: false }, touched, to))
 }
 
 fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {

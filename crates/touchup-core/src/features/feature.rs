@@ -48,6 +48,8 @@ pub struct Measured<T> {
     pub std: Option<f64>,
     /// numbers of the touches, in ascending order; none where it was fitted to the mesh
     pub touches: Vec<u32>,
+    /// whether it is a lower bound: as far as was felt, and the end was not
+    pub is_at_least: bool,
 }
 
 /// A feature of the part, in O.

@@ -21,6 +21,9 @@ pub(super) struct Fitted<S> {
     /// numbers of the touches that were used
     pub touches: Vec<u32>,
     pub to: FittedTo,
+    /// whether the residuals say how far the surface is off: those of touches do, and those of a mesh that nothing touched; beside
+    /// touches they are of a surface that nobody felt, which may be off as a whole
+    pub is_confirmed: bool,
 }
 
 /// Fits surfaces; each plane once.
@@ -142,12 +145,14 @@ impl<'a> Measure<'a> {
         {
             let touches = touches.into_iter().zip(&found.used).filter(|&(_, used)| *used).map(|(touch, _)| touch);
             let touches = touches.collect();
-            return Fitted { surface: found.surface.clone(), fit: Some(found), touches, to: FittedTo::Touches };
+            let (surface, to) = (found.surface.clone(), FittedTo::Touches);
+            return Fitted { surface, fit: Some(found), touches, to, is_confirmed: true };
         }
         let params = FitParams { axis_sigma, ..FitParams::default() };
         let found = fit(guess, of_mesh, &params).ok();
         let surface = found.as_ref().map_or_else(|| guess.clone(), |found| found.surface.clone());
-        Fitted { surface, fit: found, touches: Vec::new(), to: FittedTo::Mesh }
+        let is_confirmed = !self.observed.has_touches();
+        Fitted { surface, fit: found, touches: Vec::new(), to: FittedTo::Mesh, is_confirmed }
     }
 
     /// Share of a turn around a wall that touches cover.
@@ -182,20 +187,35 @@ impl Fitted<Plane> {
     /// Where a line meets the plane, m; its uncertainty is along the normal.
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
         let value = from + direction * self.surface.along(from, direction)?;
-        let std = self.fit.as_ref().and_then(|fit| fit.std_at(&value));
-        Some(Measured { value, std, touches: self.touches.clone() })
+        let std = self.confirmed().and_then(|fit| fit.std_at(&value));
+        Some(Measured { value, std, touches: self.touches.clone(), is_at_least: false })
     }
 }
 
 impl<S: Surface> Fitted<S> {
+    /// The fit, where its standard deviations are those of the surface.
+    pub fn confirmed(&self) -> Option<&Fit<S>> {
+        self.fit.as_ref().filter(|_| self.is_confirmed)
+    }
+
     /// The direction of the surface, oriented along `direction`.
     pub fn axis(&self, direction: &Vector3<f64>) -> Measured<Vector3<f64>> {
         let value = self.surface.axis_towards(direction);
-        Measured { value, std: self.fit.as_ref().and_then(Fit::axis_std), touches: self.touches.clone() }
+        Measured {
+            value,
+            std: self.confirmed().and_then(Fit::axis_std),
+            touches: self.touches.clone(),
+            is_at_least: false,
+        }
     }
 
     /// A fitted number, or its value without a fit.
     pub fn number(&self, value: f64, by: &[(Freedom, f64)]) -> Measured<f64> {
-        Measured { value, std: self.fit.as_ref().and_then(|fit| fit.std_by(by)), touches: self.touches.clone() }
+        Measured {
+            value,
+            std: self.confirmed().and_then(|fit| fit.std_by(by)),
+            touches: self.touches.clone(),
+            is_at_least: false,
+        }
     }
 }

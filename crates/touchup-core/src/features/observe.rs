@@ -108,6 +108,11 @@ impl<'a> Observed<'a> {
         sum / numbers.len().max(1) as f64
     }
 
+    /// Whether the part was touched anywhere.
+    pub fn has_touches(&self) -> bool {
+        !self.touches.is_empty()
+    }
+
     pub fn touch(&self, number: u32) -> &ProbedPoint {
         &self.touches[number as usize]
     }

@@ -127,7 +127,12 @@ mod tests {
         let feature = Feature {
             kind: Kind::Hole,
             axis: Some(Measured { value: Vector3::z(), ..Measured::default() }),
-            diameter: Some(Measured { value: 2.0 * wall.radius, std: Some(1e-5), touches: numbers }),
+            diameter: Some(Measured {
+                value: 2.0 * wall.radius,
+                std: Some(1e-5),
+                touches: numbers,
+                is_at_least: false,
+            }),
             depth: Some(Measured { value: 10e-3, ..Measured::default() }),
             walls: Some(Walls::Round(wall)),
             ..Feature::default()
