@@ -75,7 +75,7 @@ Exit codes: 0 all as asked, 1 no result, 2 wrong usage, 3 bad input file, 4 not 
 
 const STEP_FIELDS: &str = "\
 In, one object per line: p_m, force_n, b_m, n (arrays of three), dt_s, h_min_m, delta, f_max_n, alpha_m_per_n_s,
-beta_per_n2_s, step: lie|corrected|dp5, along: normal0|force. k_n_per_m instead of h_min_m, delta and f_max_n takes the
+beta_per_n2_s, step: lie|corrected|bounded|dp5, along: normal0|force. k_n_per_m instead of h_min_m, delta and f_max_n takes the
 linear spring. Out, in the same order: {\"b_m\",\"n\"} with 17 digits, or {\"error\"}.";
 
 #[cfg(any(feature = "ros", feature = "r2r"))]

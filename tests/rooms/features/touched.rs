@@ -297,6 +297,11 @@ fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
         let axis = feature.axis.as_ref().and_then(|axis| axis.std);
         assert!(feature.centre.std.is_none() && axis.is_none(), "{feature:?}");
     }
+    // neither end was felt: as long as the wall was, from a third of the way on
+    let of_wall = |touch: &&ProbedPoint| touch.normal.z == 0.0 && touch.point.z < top - 0.9e-3;
+    let of_wall: Vec<ProbedPoint> = touches.iter().filter(of_wall).copied().collect();
+    let bound = depth(&of(&of_wall));
+    assert!(bound.is_at_least && (bound.value - 2.0 / 3.0 * felt).abs() < 0.05e-3, "{bound:?}");
     let is_known = |feature: &&Feature| feature.fitted_to == FittedTo::Touches && feature.centre.std.is_some();
     assert_eq!(touched.iter().filter(is_known).count(), 2, "the hole and the surface around it");
 }

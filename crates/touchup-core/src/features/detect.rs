@@ -97,18 +97,28 @@ type AxisEnd = Measured<Point3<f64>>;
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
     let touches = distinct(from.touches.iter().chain(&to.touches).copied());
-    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches, is_at_least: false }
+    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches, ..Measured::default() }
 }
 
-/// From the end that was felt to the other one; as far as the wall was felt where that other end was not: it may be a guess.
+/// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a guess: then it is as far as the
+/// wall was felt, and a lower bound.
 fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd, out: &Vector3<f64>) -> Measured<f64> {
-    if fitted.to == FittedTo::Mesh || !to.touches.is_empty() {
+    let is_felt = [from, to].map(|end| !end.touches.is_empty());
+    if fitted.to == FittedTo::Mesh || is_felt == [true; 2] {
         return between(from, to, out);
     }
     let side = (to.value - from.value).dot(out).signum();
-    let along = |&number: &u32| (measure.observed.touch(number).point - from.value).dot(out) * side;
-    let value = fitted.touches.iter().map(along).fold(0.0, f64::max);
-    Measured { value, std: None, touches: fitted.touches.clone(), is_at_least: true }
+    let along = |point: &Point3<f64>| (point - from.value).dot(out) * side;
+    let of_wall = fitted.touches.iter().map(|&number| along(&measure.observed.touch(number).point));
+    let (lowest, highest) = of_wall.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+    let begin = if is_felt[0] { 0.0 } else { lowest };
+    let end = if is_felt[1] { along(&to.value) } else { highest };
+    Measured {
+        value: (end - begin).max(0.0),
+        touches: fitted.touches.clone(),
+        is_at_least: true,
+        ..Measured::default()
+    }
 }
 
 impl AxisEnd {
@@ -123,7 +133,7 @@ impl AxisEnd {
     /// - `std`: of the place, from the fit, m.
     fn centre<S: Surface>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Self {
         let touches = distinct(fitted.touches.iter().chain(&self.touches).copied());
-        Self { value: self.value, std: fitted.confirmed().and_then(std), touches, is_at_least: false }
+        Self { value: self.value, std: fitted.confirmed().and_then(std), touches, ..Self::default() }
     }
 }
 
@@ -166,7 +176,7 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     let (surface, fit, is_confirmed) = (rim.fit.surface, Some(rim.fit.clone()), !measure.observed.has_touches());
     let fitted = Fitted { surface, fit, touches: Vec::new(), to: FittedTo::Mesh, is_confirmed };
     let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&rim.centre));
-    let centre = Measured { value: rim.centre, std, touches: Vec::new(), is_at_least: false };
+    let centre = Measured { value: rim.centre, std, touches: Vec::new(), ..Measured::default() };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
@@ -291,7 +301,7 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     let touches = distinct(planes.iter().flat_map(|plane| plane.touches.iter().copied()));
     let touched = measure.observed.touched_along(&[point, point]);
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
-    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches, is_at_least: false }, touched, to))
+    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches, ..Measured::default() }, touched, to))
 }
 
 fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {

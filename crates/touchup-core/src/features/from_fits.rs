@@ -89,7 +89,7 @@ impl Feature {
         let middle = nalgebra::center(&ends[0], &ends[1]);
         // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
         let std = std_at(0, &middle).zip(std_at(1, &middle)).map(|(s, t)| s.hypot(t) / sine);
-        let axis = Measured { value, std: None, touches: touches.clone(), is_at_least: false };
+        let axis = Measured { value, std: None, touches: touches.clone(), ..Measured::default() };
         let edge = Self {
             length: Some(Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() }),
             points: ends.to_vec(),
@@ -110,7 +110,7 @@ impl Feature {
     }
 
     fn touched(kind: Kind, centre: Point3<f64>, std: Option<f64>, touches: Touches) -> Self {
-        Self::new(kind, Measured { value: centre, std, touches, is_at_least: false }, 1.0, FittedTo::Touches)
+        Self::new(kind, Measured { value: centre, std, touches, ..Measured::default() }, 1.0, FittedTo::Touches)
     }
 }
 
@@ -122,17 +122,22 @@ fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f6
 
 /// Its direction, with the sign of `out`.
 pub(super) fn axis_of<S: Surface>(fit: &Fit<S>, out: &Vector3<f64>, touches: &Touches) -> Measured<Vector3<f64>> {
-    Measured { value: fit.surface.axis_towards(out), std: fit.axis_std(), touches: touches.clone(), is_at_least: false }
+    Measured {
+        value: fit.surface.axis_towards(out),
+        std: fit.axis_std(),
+        touches: touches.clone(),
+        ..Measured::default()
+    }
 }
 
 /// A number with its derivatives by the freedoms.
 pub(super) fn number<S: Surface>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)], touches: &Touches) -> Measured<f64> {
-    Measured { value, std: fit.std_by(by), touches: touches.clone(), is_at_least: false }
+    Measured { value, std: fit.std_by(by), touches: touches.clone(), ..Measured::default() }
 }
 
 /// Distance of a place from a plane, m.
 fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
     let value = (end.point - plane.surface.point()).dot(&plane.surface.normal()).abs();
     let std = plane.std_at(&end.point).map(|std| std.hypot(end.sigma));
-    Measured { value, std, touches: touches.clone(), is_at_least: false }
+    Measured { value, std, touches: touches.clone(), ..Measured::default() }
 }

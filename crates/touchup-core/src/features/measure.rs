@@ -188,7 +188,7 @@ impl Fitted<Plane> {
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
         let value = from + direction * self.surface.along(from, direction)?;
         let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Some(Measured { value, std, touches: self.touches.clone(), is_at_least: false })
+        Some(Measured { value, std, touches: self.touches.clone(), ..Measured::default() })
     }
 }
 
@@ -205,7 +205,7 @@ impl<S: Surface> Fitted<S> {
             value,
             std: self.confirmed().and_then(Fit::axis_std),
             touches: self.touches.clone(),
-            is_at_least: false,
+            ..Measured::default()
         }
     }
 
@@ -215,7 +215,7 @@ impl<S: Surface> Fitted<S> {
             value,
             std: self.confirmed().and_then(|fit| fit.std_by(by)),
             touches: self.touches.clone(),
-            is_at_least: false,
+            ..Measured::default()
         }
     }
 }

@@ -179,8 +179,12 @@ impl Feature {
 
     fn is_round(&mut self, found: &Fit<Cylinder>, touches: &Touches) {
         let centre = found.surface.nearest_on_axis(&self.centre.value);
-        self.centre =
-            Measured { value: centre, std: found.lateral_std(&centre), touches: touches.clone(), is_at_least: false };
+        self.centre = Measured {
+            value: centre,
+            std: found.lateral_std(&centre),
+            touches: touches.clone(),
+            ..Measured::default()
+        };
         self.axis = Some(self.turned(found, touches));
         self.diameter = Some(number(found, 2.0 * found.surface.radius, &[(Freedom::Size, 2.0)], touches));
         self.walls = Some(Walls::Round(found.surface));
@@ -196,7 +200,7 @@ impl Feature {
         // along the slot only its ends determine its position
         let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
         let value = start + axis * off.dot(&axis) + direction * along;
-        self.centre = Measured { value, std: found.middle_std(), touches: touches.clone(), is_at_least: false };
+        self.centre = Measured { value, std: found.middle_std(), touches: touches.clone(), ..Measured::default() };
         self.axis = Some(self.turned(found, touches));
         self.walls = Some(Walls::Slot(found.surface));
     }

@@ -47,7 +47,7 @@ impl PaperSweeps {
     /// [`MeasureError`](crate::error::MeasureError) for an edge that is no length.
     pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Measured<Self> {
         let truth = Peaks::default().mesh(edge)?;
-        // ten million samples, each 1e-7 mm off at most: solved together they would take hours
+        // ten million samples: solved together they take twenty times as long
         let mut params = RefineParams { guard, ..RefineParams::paper(TipParams { radius: 0.0, stiffness: None }) };
         params.dynamics.rule = StepRule::DriftCorrected;
         let refiner = Refiner::new(noisy(&truth, seed), params)?;

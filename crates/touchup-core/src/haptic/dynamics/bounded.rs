@@ -24,7 +24,7 @@ const AGREEMENT: f64 = 1e-11;
 /// Newton's method stops at this share of what is asked for.
 const NEWTON: f64 = 1e-2;
 const MOST_ITERATIONS: usize = 14;
-/// Steps, accepted or not, after which it gives up: about a second.
+/// Steps, accepted or not, after which it gives up.
 const MOST_STEPS: usize = 100_000;
 /// Share of the shortest time constant that the first step takes.
 const FIRST: f64 = 0.1;

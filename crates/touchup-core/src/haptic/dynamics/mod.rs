@@ -60,7 +60,7 @@ words! {
         Lie = "lie",
         /// The position flow again with the drift and the mean normal that the rotation causes: second order.
         DriftCorrected = "corrected",
-        /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, a thousand times the cost.
+        /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, and far slower (`cargo bench --bench dynamics`).
         Bounded = "bounded",
         /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
         DormandPrince = "dp5",

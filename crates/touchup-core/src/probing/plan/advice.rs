@@ -131,7 +131,7 @@ mod tests {
                 value: 2.0 * wall.radius,
                 std: Some(1e-5),
                 touches: numbers,
-                is_at_least: false,
+                ..Measured::default()
             }),
             depth: Some(Measured { value: 10e-3, ..Measured::default() }),
             walls: Some(Walls::Round(wall)),

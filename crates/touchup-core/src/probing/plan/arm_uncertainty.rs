@@ -104,16 +104,16 @@ mod tests {
     #[test]
     fn shared_parts_are_those_reckoned_by_hand() {
         let known = ArmUncertainty { radius: 50e-6, place: 0.2e-3, turn: 4e-3, ..ArmUncertainty::default() };
-        let number = |std| Some(Measured { value: 8e-3, std: Some(std), touches: Vec::new(), is_at_least: false });
+        let number = |std| Some(Measured { value: 8e-3, std: Some(std), touches: Vec::new(), ..Measured::default() });
         let hole = Feature {
             kind: Kind::Hole,
             centre: Measured {
                 value: Point3::new(30e-3, 0.0, 0.0),
                 std: Some(10e-6),
                 touches: Vec::new(),
-                is_at_least: false,
+                ..Measured::default()
             },
-            axis: Some(Measured { value: Vector3::z(), std: Some(1e-3), touches: Vec::new(), is_at_least: false }),
+            axis: Some(Measured { value: Vector3::z(), std: Some(1e-3), touches: Vec::new(), ..Measured::default() }),
             diameter: number(20e-6),
             depth: number(7e-6),
             ..Feature::default()
