@@ -70,7 +70,7 @@ fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a F
 fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
     let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
         let std = record.and_then(|record| record.std.get(name).copied());
-        let is_lower_bound = record.is_some_and(|record| record.at_least.iter().any(|bound| bound == name));
+        let is_lower_bound = name == "depth_mm" && record.is_some_and(|record| record.depth_is_at_least == Some(true));
         FoundNumber { name, truth: truth * 1e3, found: record.and_then(value), std, is_lower_bound }
     };
     let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);

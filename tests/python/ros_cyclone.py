@@ -411,6 +411,7 @@ class Feature:
     width_std: float64
     depth: float64
     depth_std: float64
+    depth_is_at_least: bool
     cone_angle: float64
     cone_angle_std: float64
     through: uint8

@@ -75,8 +75,10 @@ reported! {
         pub width_mm?: f64 = times(&feature.width, 1e3),
         /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall goes (of a drilled hole
         /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height. Where the wall was touched
-        /// and floor or top was not, as far as that was: see `at_least`
+        /// and floor or top was not, as far as that was: see `depth_is_at_least`
         pub depth_mm?: f64 = times(&feature.depth, 1e3),
+        /// whether `depth_mm` is a lower bound; left out where it is none
+        pub depth_is_at_least?: bool = feature.depth.as_ref().filter(|depth| depth.is_at_least).map(|_| true),
         /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is untouched
         pub through?: bool = feature.through,
         /// hole: full angle of its countersink
@@ -95,9 +97,6 @@ reported! {
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =
             known(feature).filter_map(|(name, std, _)| Some((name.to_owned(), std?))).collect(),
-        /// names of the numbers that are lower bounds: as far as was felt, and the end was not
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub at_least: Vec<String> = lower_bounds(feature).map(str::to_owned).collect(),
         /// share of its surface within a ball's radius of a touch
         #[serde(default)]
         pub touched: f64 = feature.touched,
@@ -115,12 +114,6 @@ reported! {
 
 /// Name of a number, its standard uncertainty, and the touches behind it.
 type KnownNumber<'a> = (&'static str, Option<f64>, &'a [u32]);
-
-/// Names of the sizes that are lower bounds.
-fn lower_bounds(feature: &Feature) -> impl Iterator<Item = &'static str> {
-    let sizes = [("length_mm", &feature.length), ("width_mm", &feature.width), ("depth_mm", &feature.depth)];
-    sizes.into_iter().filter(|(_, size)| size.as_ref().is_some_and(|size| size.is_at_least)).map(|(name, _)| name)
-}
 
 /// The measured numbers of a feature.
 fn known(feature: &Feature) -> impl Iterator<Item = KnownNumber<'_>> {

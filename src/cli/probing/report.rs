@@ -235,7 +235,7 @@ fn numbers(feature: &FeatureRecord) -> String {
     let with = |name: &str, value: Option<f64>, key: &str| {
         value.map(|value| match feature.std.get(key) {
             Some(std) => format!("{name}{value:.3} ± {std:.3}"),
-            None if feature.at_least.iter().any(|bound| bound == key) => format!("{name}≥ {value:.3}"),
+            None if key == "depth_mm" && feature.depth_is_at_least == Some(true) => format!("{name}≥ {value:.3}"),
             None => format!("{name}{value:.3}"),
         })
     };

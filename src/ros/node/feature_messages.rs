@@ -81,6 +81,7 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
         width_std: std(&feature.width),
         depth: number(&feature.depth),
         depth_std: std(&feature.depth),
+        depth_is_at_least: feature.depth.as_ref().is_some_and(|depth| depth.is_at_least),
         cone_angle: number(&feature.cone_angle),
         cone_angle_std: std(&feature.cone_angle),
         through: yes_no(feature.through),
