@@ -4,6 +4,13 @@ use std::collections::VecDeque;
 
 use super::{StampedPose, StampedWrench, SyncCounts, SyncParams};
 
+/// Messages one after the other that show together that time has leapt: four wrong ones in a row are seen in practice.
+const AGREEING: usize = 5;
+/// … and that show where a stream begins: before it nothing can become late.
+const AGREEING_AT_FIRST: usize = 2;
+/// Between two messages that agree: 10 s are a pause, not a fault, ns.
+const LONGEST_PAUSE_NS: i64 = 10_000_000_000;
+
 /// One stream in order of time, as far as it is held.
 #[derive(Debug)]
 pub(super) struct Stream<T> {
@@ -11,8 +18,8 @@ pub(super) struct Stream<T> {
     newest: Option<i64>,
     /// a stamp up to here is late
     pub watermark: i64,
-    /// leaps ahead; waits for the next message to agree
-    suspect: Option<T>,
+    /// leap ahead and agree with each other; wait for the next ones to do so too
+    leapt: Vec<T>,
     /// how far a message may lag behind the newest, and one more, ns; 0: none may
     wait_ns: i64,
     /// messages were pushed out of the full buffer
@@ -26,7 +33,7 @@ impl<T: Stamped + Copy> Stream<T> {
             held: VecDeque::with_capacity(capacity),
             newest: None,
             watermark: i64::MIN,
-            suspect: None,
+            leapt: Vec::with_capacity(AGREEING),
             wait_ns,
             overflown: false,
             counts: SyncCounts::default(),
@@ -34,30 +41,56 @@ impl<T: Stamped + Copy> Stream<T> {
     }
 
     /// Takes a message, or counts why not; whether it is kept, for now at least.
+    ///
+    /// What leaps ahead waits for others that agree: one wrong stamp would make all that is right late until its time has come.
     pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
-        if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(params.largest_jump_ns)) {
-            return self.insert(message, params);
+        let leap_ns = params.largest_jump_ns.max(params.reorder_ns);
+        if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(leap_ns)) {
+            let is_kept = self.insert(message, params);
+            if is_kept {
+                self.refuse_leapt();
+            }
+            return is_kept;
         }
-        match self.suspect.take() {
-            Some(first) if stamp.abs_diff(first.stamp_ns()) <= params.largest_jump_ns as u64 => {
-                self.insert(first, params);
-                self.insert(message, params)
-            }
-            refused => {
-                self.counts.jump += refused.is_some() as u64;
-                self.suspect = Some(message);
-                true
-            }
+        let agrees = |before: &T| {
+            let earliest = before.stamp_ns().saturating_sub(params.reorder_ns);
+            (earliest..=before.stamp_ns().saturating_add(LONGEST_PAUSE_NS)).contains(&stamp)
+        };
+        if !self.leapt.last().is_some_and(agrees) {
+            self.refuse_leapt();
+        }
+        self.leapt.push(message);
+        if self.leapt.len() == if self.newest.is_some() { AGREEING } else { AGREEING_AT_FIRST } {
+            self.insert_leapt(params);
+        }
+        true
+    }
+
+    /// Messages that no other contradicted are kept.
+    pub fn finish(&mut self, params: &SyncParams) {
+        let reached = self.newest.map(|newest| newest.saturating_add(LONGEST_PAUSE_NS));
+        match &self.leapt[..] {
+            [only] if reached.is_some_and(|reached| only.stamp_ns() > reached) => self.refuse_leapt(),
+            _ => self.insert_leapt(params),
         }
     }
 
-    /// A message that no other contradicted is kept.
-    pub fn finish(&mut self, params: &SyncParams) {
-        match self.suspect.take() {
-            Some(only) if self.newest.is_none() => drop(self.insert(only, params)),
-            refused => self.counts.jump += refused.is_some() as u64,
+    /// Stamp of the newest message that is kept for good, ns.
+    pub fn newest_ns(&self) -> Option<i64> {
+        self.newest
+    }
+
+    fn refuse_leapt(&mut self) {
+        self.counts.jump += self.leapt.len() as u64;
+        self.leapt.clear();
+    }
+
+    fn insert_leapt(&mut self, params: &SyncParams) {
+        for at in 0..self.leapt.len() {
+            self.insert(self.leapt[at], params);
         }
+        self.leapt.clear();
     }
 
     fn insert(&mut self, message: T, params: &SyncParams) -> bool {

@@ -123,6 +123,11 @@ impl Synchroniser {
         &self.poses.counts
     }
 
+    /// Newest stamp of either stream that is kept for good, ns; `None` before the first. The offset of the wrench is taken off.
+    pub fn newest_ns(&self) -> Option<i64> {
+        self.poses.newest_ns().max(self.wrenches.newest_ns())
+    }
+
     /// Up to this stamp nothing of `stream` can arrive any more.
     fn watermark<T>(&self, stream: &Stream<T>) -> i64 {
         if self.finished { i64::MAX } else { stream.watermark }

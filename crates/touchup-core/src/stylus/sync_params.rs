@@ -16,10 +16,10 @@ parameters! {
         ///
         /// A hand at 50 mm/s goes 1.5 mm, the radius of a usual ball, in 30 ms.
         largest_gap_ns: i64 = 30.0, "largest_gap_ms" [MS, 0, 60000];
-        /// A stamp this far ahead of its stream is accepted only when the next one agrees.
+        /// A stamp this far ahead of its stream is accepted only when the next four agree; it costs only itself when they do not.
         ///
-        /// 10 s are a pause, not a fault, when they are true.
-        largest_jump_ns: i64 = 10.0, "largest_jump_s" [S, 0, 1e6];
+        /// A stream slower than 10 Hz comes five messages at a time, late and whole.
+        largest_jump_ns: i64 = 0.1, "largest_jump_s" [S, 0, 1e6];
         /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
         wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
         /// How many messages of each stream are held.
@@ -46,7 +46,7 @@ pub struct SyncCounts {
     pub not_finite: u64,
     /// Messages that no stylus can cause, or whose orientation is no rotation.
     pub absurd: u64,
-    /// Messages whose stamp leaps ahead and is not confirmed by the next.
+    /// Messages whose stamp leaps ahead and is not confirmed by the next ones.
     pub jump: u64,
     /// Wrenches pushed out of a full buffer, or whose poses were.
     pub overflow: u64,
