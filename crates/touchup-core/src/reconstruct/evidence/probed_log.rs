@@ -1,16 +1,24 @@
 //! The touches themselves, downsampled in time, of which features are measured.
 
+use nalgebra::Point3;
+
+use crate::numeric::voxel_of;
 use crate::reconstruct::evidence::contact_map::Verdict;
 use crate::reconstruct::evidence::touches::{SurfaceContact, TipTouch};
+use crate::reconstruct::field::lattice::LatticeNode;
 use crate::reconstruct::incremental::history::Direction;
+use crate::reconstruct::table::CellTable;
 use crate::stylus::ProbedPoint;
 
-/// Touches in order of time. A bounded number: when there are too many, every second one is dropped.
+/// Touches in order of time. Their number is bounded by the surface that they are on: when there are more, every second one is
+/// dropped of each cell that has many.
 #[derive(Clone, Debug)]
 pub(crate) struct ProbedLog {
     /// radius of the tip when it is a ball, m
     ball: Option<f64>,
     points: Vec<ProbedPoint>,
+    /// how many of them are in each cell
+    of_cell: CellTable<LatticeNode, usize>,
     undone: Vec<ProbedPoint>,
     /// strokes begun and not undone
     strokes: u32,
@@ -19,15 +27,32 @@ pub(crate) struct ProbedLog {
 
 /// Touches closer together in time are redundant: the window in which they are smoothed is eight times as long.
 const SPACING_NS: i64 = 4_000_000;
-/// So many touches are kept: over an hour of them.
+/// So many touches are kept wherever they are: four minutes of them, 10 MB.
+const ALWAYS_KEPT: usize = 1 << 16;
+/// … and so many more for each cell of the surface: 0.1 mm apart they would be one for each of their places.
+const OF_A_CELL: usize = 64;
+/// Edge of a cell, m.
+const CELL: f64 = 1e-3;
+/// So many are kept of however large a part.
 const MOST_POINTS: usize = 1 << 20;
+
+fn cell_of(point: &Point3<f64>) -> LatticeNode {
+    voxel_of(point, CELL)
+}
 
 impl ProbedLog {
     /// An empty log.
     ///
     /// - `ball`: radius of the tip when it is a ball, m.
     pub fn new(ball: Option<f64>) -> Self {
-        Self { ball, points: Vec::new(), undone: Vec::new(), strokes: 0, spacing_ns: SPACING_NS }
+        Self {
+            ball,
+            points: Vec::new(),
+            of_cell: CellTable::default(),
+            undone: Vec::new(),
+            strokes: 0,
+            spacing_ns: SPACING_NS,
+        }
     }
 
     /// All touches, in order of time.
@@ -49,13 +74,12 @@ impl ProbedLog {
             return;
         }
         if self.points.len() >= MOST_POINTS {
-            let mut at = 0;
-            self.points.retain(|_| {
-                at += 1;
-                at % 2 == 0
-            });
             self.spacing_ns *= 2;
+            self.thin(0);
+        } else if self.points.len() >= ALWAYS_KEPT + OF_A_CELL * self.of_cell.len() {
+            self.thin(OF_A_CELL / 2);
         }
+        *self.of_cell.get_or_default(cell_of(&contact.point)) += 1;
         self.points.push(ProbedPoint {
             stamp_ns: touch.stamp_ns,
             stroke: self.strokes.saturating_sub(1),
@@ -68,6 +92,23 @@ impl ProbedLog {
             weight: contact.weight,
             is_rejected: verdict == Verdict::Rejected,
         });
+    }
+
+    /// Drops every second touch of each cell that has more than `few`.
+    fn thin(&mut self, few: usize) {
+        let (of_cell, mut seen) = (&self.of_cell, CellTable::<LatticeNode, usize>::default());
+        self.points.retain(|touch| {
+            let cell = cell_of(&touch.point);
+            let at = seen.get_or_default(cell);
+            *at += 1;
+            *at % 2 == 0 || of_cell.get(&cell).is_none_or(|count| *count <= few)
+        });
+        self.count_cells();
+    }
+
+    fn count_cells(&mut self) {
+        self.of_cell = CellTable::default();
+        self.points.iter().for_each(|touch| *self.of_cell.get_or_default(cell_of(&touch.point)) += 1);
     }
 
     /// Takes the last stroke back, or does the one again that was undone last.
@@ -85,6 +126,7 @@ impl ProbedLog {
                 }
             }
         }
+        self.count_cells();
     }
 }
 
@@ -123,6 +165,33 @@ mod tests {
         noted(&mut log, 5000);
         log.exchange(Direction::Redo);
         assert_eq!(log.points().len(), 11, "what was undone is gone once something else was touched");
+    }
+
+    /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: what is kept has the bound of its cells at any time, and every cell keeps
+    /// many of its touches.
+    #[test]
+    fn an_hour_on_a_small_part_keeps_what_its_surface_bounds() {
+        let mut log = ProbedLog::new(Some(1.5e-3));
+        log.begin_stroke();
+        let normal = Vector3::z();
+        // back and forth between 0.5 and 6.5 of a cell, at speeds that share no period
+        let swings = |t: f64, speed: f64| 0.5 * CELL + 6.0 * CELL * (1.0 - ((t * speed).rem_euclid(2.0) - 1.0).abs());
+        let mut most = 0;
+        for at in 0..900_000i64 {
+            let stamp_ns = at * SPACING_NS;
+            let t = stamp_ns as f64 * 1e-9;
+            let point = Point3::new(swings(t, 5.0), swings(t, 0.377), 0.5 * CELL);
+            let contact = SurfaceContact { point, normal, weight: 1.0, stamp_ns, sigma: ContactSigma::default() };
+            let centre = point + normal * 1.5e-3;
+            let touch = TipTouch { stamp_ns, centre, axis: normal, contact: Some(contact) };
+            log.note(&touch, &contact, Verdict::Taken);
+            most = most.max(log.points().len());
+        }
+        assert_eq!(log.of_cell.len(), 49);
+        assert!(most <= ALWAYS_KEPT + 49 * OF_A_CELL && most > ALWAYS_KEPT, "{most}");
+        assert!(log.points.is_sorted_by_key(|touch| touch.stamp_ns));
+        let fewest = log.of_cell.iter().map(|(_, count)| *count).min();
+        assert!(fewest >= Some(OF_A_CELL / 4), "{fewest:?}");
     }
 
     #[test]
