@@ -115,6 +115,29 @@ impl Engine {
         if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.rest(&mut self.refiner) } else { Ok(()) }
     }
 
+    /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit, what [`Patcher::patched`] makes of all
+    /// samples so far, as a file of the result shows it. Returns whether it is that. The next sample may come at any time, and what it
+    /// changes is as if nothing had been settled. Never waits; without a patch beside the samples there is nothing to do.
+    ///
+    /// # Errors
+    /// As [`Self::rest`].
+    pub fn settle(&mut self) -> Result<bool, LiveError> {
+        if let Reconstruction::Beside(renewals) = &mut self.patch {
+            renewals.settle(&mut self.refiner)
+        } else {
+            Ok(true)
+        }
+    }
+
+    /// Whether the mesh is what a file of all samples so far shows.
+    pub fn is_settled(&self) -> bool {
+        match &self.patch {
+            Reconstruction::Without => true,
+            Reconstruction::AtEnd(_) => false,
+            Reconstruction::Beside(renewals) => renewals.is_settled(),
+        }
+    }
+
     /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing where the patch is made at the end.
     ///
     /// # Errors

@@ -72,6 +72,8 @@ pub(super) struct Renewals {
     pub is_done: bool,
     /// whether the change that is due is known to be late
     is_late: bool,
+    /// whether the mesh is, or becomes with what is open, what the patch of all samples so far shows at once
+    is_settled: bool,
     /// touches not yet requested
     probed: TouchDelta,
     pub counts: LiveCounts,
@@ -90,6 +92,7 @@ impl Renewals {
             delta: PatchDelta::default(),
             is_done: true,
             is_late: false,
+            is_settled: true,
             probed: TouchDelta::default(),
             counts: LiveCounts::default(),
         })
@@ -97,6 +100,7 @@ impl Renewals {
 
     /// Takes a sample that the haptic update has taken; moves the mesh by what the patch has found that is due by now.
     pub fn push(&mut self, refiner: &mut Refiner, contact: ContactSample) -> Result<(), LiveError> {
+        self.is_settled = false;
         let stamp_ns = contact.tip.stamp_ns;
         let slot = stamp_ns.div_euclid(self.pace.every_ns);
         let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
@@ -147,6 +151,26 @@ impl Renewals {
         Ok(())
     }
 
+    /// As [`super::Engine::settle`].
+    pub fn settle(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
+        self.rest(refiner)?;
+        if !self.is_done || !self.due_ns.is_empty() || !self.batch.is_empty() {
+            return Ok(false);
+        }
+        if !self.is_settled {
+            self.is_settled = true;
+            self.worker.ask(Question::Settle)?;
+            self.due_ns.push_back(i64::MIN);
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    /// Whether the mesh is what the patch of all samples so far shows at once.
+    pub fn is_settled(&self) -> bool {
+        self.is_settled && self.is_done && self.due_ns.is_empty()
+    }
+
     /// As [`super::Engine::catch_up`].
     pub fn catch_up(&mut self, refiner: &mut Refiner) -> Result<(), LiveError> {
         self.ask(i64::MAX)?;
@@ -165,6 +189,7 @@ impl Renewals {
         change: fn(&mut Patcher) -> bool,
     ) -> Result<bool, LiveError> {
         self.catch_up(refiner)?;
+        self.is_settled = false;
         self.worker.ask(Question::ChangeStrokes(change))?;
         self.due_ns.push_back(i64::MAX);
         self.take_up_all(refiner)

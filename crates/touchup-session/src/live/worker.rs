@@ -18,6 +18,8 @@ pub(super) enum Question {
     Renew(Vec<ContactSample>),
     /// take in what is still in the smoothing window, and answer what changed
     Flush,
+    /// answer what changes where all that was touched so far is reconstructed at once, what is in the smoothing window among it
+    Settle,
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and answer what changed
@@ -55,6 +57,7 @@ impl Worker {
             for (question, _working) in inbox {
                 let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
                 let is_renewal = matches!(question, Question::Renew(_));
+                let settles = matches!(question, Question::Settle);
                 match question {
                     Question::Renew(samples) => {
                         gate.pass();
@@ -70,9 +73,13 @@ impl Worker {
                         continue;
                     }
                     Question::Flush => patcher.flush(),
+                    Question::Settle => {}
                     Question::ChangeStrokes(change) => has_changed_strokes = change(&mut patcher),
                 }
-                let delta = patcher.renewed(&scan.0, &scan.1);
+                let delta = match settles {
+                    true => patcher.settled(&scan.0, &scan.1),
+                    false => patcher.renewed(&scan.0, &scan.1),
+                };
                 let probed = published.changes(patcher.probed());
                 if to_engine.send(WorkerAnswer { delta, probed, has_changed_strokes, batch }).is_err() {
                     break;

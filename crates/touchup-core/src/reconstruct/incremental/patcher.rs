@@ -367,6 +367,26 @@ impl Patcher {
         PatchDelta { until_ns: self.history.until_ns, ..delta }
     }
 
+    /// As [`Self::renewed`], when the stream pauses: after it the sum of all changes is what [`Self::patched`] shows of all touches so
+    /// far, those in the smoothing window among them, bit by bit. What counts later is as if this had not been asked for.
+    ///
+    /// It takes the time of a whole reconstruction.
+    pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
+        let mut all = self.copy();
+        all.flush();
+        all.history.contacts.note_all();
+        all.update(scan, tree);
+        let (remesh, mut renewed) = all.remeshed(scan, tree);
+        let mut live = self.live.take().unwrap_or_default();
+        renewed.core = CellBox::ALL;
+        renewed.scanned.extend(live.published.scan_faces());
+        (live.remesh, live.is_outdated) = (remesh, false);
+        let support = |key: &VertexKey| support_of(key, &live.remesh.grid);
+        let delta = live.published.take(&renewed, &live.remesh.region, scan, support);
+        self.live = Some(live);
+        PatchDelta { until_ns: all.history.until_ns, ..delta }
+    }
+
     fn update(&mut self, scan: &TriMesh, tree: &FaceTree) {
         let changes = self.history.update(scan, tree);
         if let Some(live) = &mut self.live {
