@@ -26,6 +26,7 @@ pub use touchup_session::{clock, live, replay, scene, session};
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
+pub mod log_lines;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod ros;
 #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -217,6 +217,8 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
     // have left the graph already
     let libraries = [
         ("ros2_client", LevelFilter::ERROR),
+        // what it sends to /rosout is in the log already
+        ("ros2_client::rosout", LevelFilter::OFF),
         ("rustdds", LevelFilter::ERROR),
         ("rustdds::dds::pubsub", LevelFilter::OFF),
     ];

@@ -37,6 +37,10 @@ pub enum RosError {
 /// What the parts of a port share.
 pub(super) struct Exchange {
     pub inbox: Inbox,
+    /// with its namespace
+    pub node_name: String,
+    /// of wrenches and of poses, whole
+    sample_topics: [String; 2],
     pub clock: RosClock,
     /// what is small and urgent, answers among it
     pub urgent: SendQueue,
@@ -49,6 +53,9 @@ impl Exchange {
     pub fn new(config: &NodeConfig, inbox: Inbox) -> Arc<Self> {
         Arc::new(Self {
             inbox,
+            // a name that is none is refused where the topic is listened to
+            sample_topics: config.sample_topics().map(|name| config.resolve(name).unwrap_or_default()),
+            node_name: config.place.full_name(),
             clock: RosClock::new(config.parameters.bool("use_sim_time")),
             urgent: SendQueue::default(),
             mesh: SendQueue::default(),
@@ -133,6 +140,14 @@ impl<C: Send + Sync> Port for Joined<C> {
             _ => &self.exchange.urgent,
         }
         .put(publication);
+    }
+
+    fn node_name(&self) -> &str {
+        &self.exchange.node_name
+    }
+
+    fn sample_topics(&self) -> [&str; 2] {
+        self.exchange.sample_topics.each_ref().map(String::as_str)
     }
 
     fn now_ns(&self) -> i64 {

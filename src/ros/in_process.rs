@@ -36,6 +36,14 @@ impl Port for InProcess {
         published.push_back(publication);
     }
 
+    fn node_name(&self) -> &str {
+        "/touchup"
+    }
+
+    fn sample_topics(&self) -> [&str; 2] {
+        ["/stylus/wrench", "/stylus/pose"]
+    }
+
     fn now_ns(&self) -> i64 {
         let (now_ns, at) = *locked(&self.now_ns);
         now_ns + self.clock.since(at).as_nanos() as i64

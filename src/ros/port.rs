@@ -175,6 +175,12 @@ pub trait Port: Send + Sync {
     /// Sends; never blocks for longer than it takes to write the message down.
     fn publish(&self, publication: Publication);
 
+    /// Name of the node with its namespace: `/cell/touchup`.
+    fn node_name(&self) -> &str;
+
+    /// Names of the topics that wrenches and poses come on, whole, as [`Endpoint::topic`] has them.
+    fn sample_topics(&self) -> [&str; 2];
+
     /// Time of ROS, ns: the system's, or that of `/clock` with `use_sim_time`.
     fn now_ns(&self) -> i64;
 

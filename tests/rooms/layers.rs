@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 /// of the report are a room each. Circles between crates need no check: cargo refuses them.
 const MAY_USE: &[(&str, &str)] = &[
     ("clock", ""),
+    ("log_lines", ""),
     ("numeric", ""),
     ("parameters", ""),
     ("stylus", "numeric parameters"),
@@ -33,7 +34,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("ur", "clock stylus plan arm"),
     (
         "ros",
-        "parameters clock stylus mesh reconstruct haptic live features plan arm execute sim align calibrate \
+        "parameters clock log_lines stylus mesh reconstruct haptic live features plan arm execute sim align calibrate \
          compare io scene session",
     ),
     ("ros2_control", "clock stylus plan arm ros"),

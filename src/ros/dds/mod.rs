@@ -7,15 +7,19 @@ mod action;
 mod answers;
 mod arm_port;
 mod back_end;
+mod environment;
 mod graph;
 mod incoming;
 mod keep_alive;
+mod rosout;
 mod samples;
 mod services;
 mod topics;
 
+use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, OnceLock};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
 
 use ros2_client::dds::rustdds;
 use ros2_client::{Node, NodeOptions};
@@ -37,9 +41,12 @@ struct DdsConnection {
     exchange: Arc<Exchange>,
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
-    // its entities leave the graph when it goes
-    _node: Arc<Node>,
+    /// its entities leave the graph when it goes
+    node: Option<Arc<Node>>,
 }
+
+/// The network is left within this time, or as it is: RustDDS that is busy with what it received keeps no node from its end.
+const LEAVES_WITHIN: Duration = Duration::from_secs(20);
 
 impl Drop for DdsConnection {
     fn drop(&mut self) {
@@ -47,7 +54,19 @@ impl Drop for DdsConnection {
         self.exchange.close();
         // without it the thread stays until the next message: nothing worse
         let _ = self.waker.wake();
-        exchange::join(self.threads.drain(..));
+        let (threads, node) = (std::mem::take(&mut self.threads), self.node.take());
+        let (done, has_left) = sync_channel(1);
+        let leave = move || {
+            exchange::join(threads);
+            drop(node);
+            // nobody may wait any more
+            let _ = done.send(());
+        };
+        let is_late = Builder::new().name("touchup-leave".to_owned()).spawn(leave).is_err()
+            || has_left.recv_timeout(LEAVES_WITHIN).is_err();
+        if is_late {
+            tracing::warn!("the network is not left in order: others see the node until its lease is over");
+        }
     }
 }
 
@@ -56,6 +75,9 @@ impl Drop for DdsConnection {
 /// # Errors
 /// [`RosError`]: a name that is none, no network, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
+    for line in environment::unheeded(|name| std::env::var(name).ok()) {
+        tracing::warn!("{line}");
+    }
     let exchange = Exchange::new(config, inbox);
     // its own parameter services know one mapping alone, and nothing of ranges
     let options = declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
@@ -92,7 +114,8 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (waker, listening) = incoming::listen(listeners, look_every, &exchange)?;
     let mut threads = vec![listening];
     threads.extend(exchange.senders(urgent, mesh)?);
-    let connection = DdsConnection { exchange: exchange.clone(), waker, threads, _node: node };
+    threads.push(rosout::send(&node, &exchange)?);
+    let connection = DdsConnection { exchange: exchange.clone(), waker, threads, node: Some(node) };
     Ok(Arc::new(Joined { exchange, _connection: connection }))
 }
 

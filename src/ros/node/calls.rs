@@ -219,7 +219,9 @@ impl RefinementWorker {
         let patcher = self.session.engine.copy_patcher().map_err(|error| error.to_string())?;
         self.send_edits();
         let snapshot = self.setup.shared.mesh.complete();
-        let (setup, mesh_version) = (Arc::clone(&self.setup), self.session.version);
+        // while the mesh moves on none of its versions is what is written
+        let (engine, setup) = (&self.session.engine, Arc::clone(&self.setup));
+        let mesh_version = if engine.is_settled() { self.session.version } else { 0 };
         Ok(move || {
             let late = |_| "mesh and touches were not complete in time: save again".to_owned();
             let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT));

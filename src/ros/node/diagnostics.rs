@@ -1,10 +1,11 @@
 //! How the node says how it is: in words, and in numbers once a second.
 
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tracing::{info, warn};
 
+use super::acceptance::{Verdict, is_of_pairing, meaning};
 use super::channels::ViewInput;
 use super::convert::header;
 use super::error::NodeError;
@@ -12,7 +13,15 @@ use super::refinement::RefinementWorker;
 use super::session::{NodeEnd, SessionReport};
 use crate::live::Quantiles;
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::ros::port::Endpoint;
 use crate::session::Unrecorded;
+
+/// The state before anything can be said of the samples.
+const BEGINS: &str = "begins";
+/// Clocks of the two streams that are farther apart are not set alike, s: no sensor is so slow.
+const CLOCKS_APART: f64 = 1.0;
+/// … and where nothing pairs, from here on that is named as the cause, s.
+const NAMED_APART: f64 = 0.1;
 
 impl RefinementWorker {
     /// Looks whether the streams come; says so when that changed.
@@ -23,6 +32,8 @@ impl RefinementWorker {
         if name != self.last_state {
             match level {
                 DiagnosticStatus::OK => info!("{words}"),
+                // the first second is too short to say anything
+                _ if name == BEGINS => return,
                 _ => warn!("{words}"),
             }
             self.last_state = name;
@@ -42,12 +53,21 @@ impl RefinementWorker {
             return (DiagnosticStatus::ERROR, words);
         }
         if self.stops.is_paused() {
+            self.acceptance.restart();
             return (DiagnosticStatus::OK, "paused: samples are passed over".to_owned());
         }
         if let Some((_, why)) =
             self.lost_transform.as_ref().filter(|(at, _)| now.saturating_duration_since(*at) < stale)
         {
             return (DiagnosticStatus::WARN, format!("holds, frames are not connected: {why}"));
+        }
+        if self.streams.iter().any(|stream| stream.arrived == 0)
+            && self.session.counters.refused.contains_key("unreadable")
+        {
+            return (
+                DiagnosticStatus::WARN,
+                format!("waits, and something comes (unreadable): {}", meaning("unreadable")),
+            );
         }
         if self.streams.iter().all(|stream| stream.arrived == 0) {
             return (DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
@@ -58,9 +78,57 @@ impl RefinementWorker {
             None => format!("no {name} has come yet"),
         });
         let ages: Vec<_> = ages.collect();
-        match ages.is_empty() {
-            false => (DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", "))),
-            true => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
+        if !ages.is_empty() {
+            self.acceptance.restart();
+            return (DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", ")));
+        }
+        self.state_of_samples(now)
+    }
+
+    /// What becomes of the samples while both streams come.
+    fn state_of_samples(&mut self, now: Instant) -> (u8, String) {
+        let verdict = self.acceptance.judge(now, self.session.counters.accepted, self.session.refused());
+        let [poses, wrenches] = &self.streams;
+        let beyond = poses.stamped_beyond(wrenches).unwrap_or(0.0);
+        let which = if beyond < 0.0 { "behind" } else { "ahead of" };
+        let apart = format!(
+            "poses are stamped {:.2} s {which} the wrenches that come at the same time: set the clocks of both sources \
+             alike",
+            beyond.abs()
+        );
+        let mut heard = self.port.sample_topics().into_iter().filter_map(|topic| self.endpoints.get(topic));
+        let mixed = heard.find(|endpoint| endpoint.count > 1);
+        if let Some(Endpoint { topic, count, .. }) = mixed {
+            let words = format!(
+                "mixes samples (of {count} publishers on {topic}): all but one measure something else; \
+                 `ros2 topic info -v {topic}` has their nodes"
+            );
+            return (DiagnosticStatus::WARN, words);
+        }
+        match verdict {
+            Verdict::Begins => (DiagnosticStatus::STALE, format!("{BEGINS}: poses and wrenches come, no sample yet")),
+            Verdict::Refuses { reason, count, of } => {
+                let is_repeated = reason.ends_with("duplicate");
+                let why = match reason.as_str() {
+                    of if (is_repeated || is_of_pairing(of)) && poses.is_unstamped() => unstamped("poses"),
+                    of if (is_repeated || is_of_pairing(of)) && wrenches.is_unstamped() => unstamped("wrenches"),
+                    of if is_of_pairing(of) && beyond.abs() > NAMED_APART => apart,
+                    of => meaning(of).to_owned(),
+                };
+                let words = format!("refuses most of what comes ({reason}): {why}; {count} of {of} lately");
+                (DiagnosticStatus::WARN, words)
+            }
+            Verdict::PairsNone => {
+                let why = match beyond.abs() > NAMED_APART {
+                    true => apart,
+                    false => "no wrench is stamped between two poses".to_owned(),
+                };
+                (DiagnosticStatus::WARN, format!("makes no samples though poses and wrenches come: {why}"))
+            }
+            Verdict::Accepts if beyond.abs() > CLOCKS_APART => {
+                (DiagnosticStatus::WARN, format!("pairs what was not measured together: {apart}"))
+            }
+            Verdict::Accepts => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
         }
     }
 
@@ -74,9 +142,9 @@ impl RefinementWorker {
         let report = self.report();
         let status = |name: &str, message: String, values| DiagnosticStatus {
             level,
-            name: format!("touchup: {name}"),
+            name: format!("{}: {name}", self.port.node_name().trim_start_matches('/')),
             message,
-            hardware_id: self.setup.source.to_owned(),
+            hardware_id: format!("{} of {}", self.setup.source, self.port.node_name()),
             values,
         };
         let how = "how poses and wrenches come, and what was refused".to_owned();
@@ -152,6 +220,10 @@ impl RefinementWorker {
         side_work.finish();
         Ok(NodeEnd { folder, report: session.end(&setup, report)? })
     }
+}
+
+fn unstamped(which: &str) -> String {
+    format!("{which} are not stamped: fill header.stamp at the source")
 }
 
 fn value(key: &str, value: impl ToString) -> KeyValue {

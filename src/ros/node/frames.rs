@@ -98,7 +98,8 @@ impl FrameBuffer {
     pub fn pose(&self, in_frame: &str, of: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
         let (target, source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
         let Some(up) = source.iter().position(|name| target.contains(name)) else {
-            let unknown = [in_frame, of].into_iter().find(|name| !self.is_known(name));
+            // of two that are not known the one that a header names
+            let unknown = [of, in_frame].into_iter().find(|name| !self.is_known(name));
             return Err(match unknown {
                 Some(name) => FrameError::Unknown(name.to_owned()),
                 None => FrameError::NotConnected(in_frame.to_owned(), of.to_owned()),

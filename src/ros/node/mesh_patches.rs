@@ -70,7 +70,10 @@ impl MeshPatches {
     }
 
     /// Remembers what changed.
-    pub fn note(&mut self, edits: &Edits) {
+    ///
+    /// - `turned`: vertices that faces have begun to use by it, or use no more.
+    pub fn note(&mut self, edits: &Edits, turned: &[u32]) {
+        turned.iter().for_each(|vertex| self.vertices.changed.insert(*vertex));
         edits.vertices.iter().for_each(|(vertex, _)| self.vertices.changed.insert(*vertex));
         edits.faces.iter().for_each(|(face, _)| self.faces.changed.insert(*face));
     }

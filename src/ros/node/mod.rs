@@ -4,6 +4,7 @@
 //! `recorder` writes down what was accepted, `arm` moves an arm where there is one. Between them are bounded queues; where one is
 //! full, what is only for viewing is dropped first, and it is counted.
 
+mod acceptance;
 mod arm;
 mod calls;
 mod channels;

@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 
 use tracing::warn;
 
+use super::acceptance::Acceptance;
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
+use super::convert::stamp_ns;
 use super::error::NodeError;
 use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
 use super::frames::FrameError;
@@ -36,6 +38,12 @@ const EDITS_EVERY: Duration = Duration::from_millis(5);
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
 /// Without a sample for so long the streams rest: longer than a renewal is given, and than usual gaps between poses.
 const RESTS_AFTER: Duration = Duration::from_millis(50);
+/// What cannot be read is said so often for each topic, and counted meanwhile.
+const UNREADABLE_EVERY: Duration = Duration::from_secs(10);
+/// From here on a stamp does not fit the seconds of a message, ns: 2038.
+const END_OF_TIME_NS: i64 = (1 << 31) * 1_000_000_000;
+/// … and after so long, and while none comes, the mesh becomes what would be saved. A hand lifts the stylus for less.
+const SETTLES_AFTER: Duration = Duration::from_millis(500);
 /// Messages of a stream that wait for a transform at most.
 const MOST_WAITING: usize = 4096;
 
@@ -49,6 +57,11 @@ enum ArrivedMessage {
 impl ArrivedMessage {
     fn stream(&self) -> usize {
         usize::from(matches!(self, Self::Wrench(_)))
+    }
+
+    fn stamp_ns(&self) -> Option<i64> {
+        let (Self::Pose(PoseStamped { header, .. }) | Self::Wrench(WrenchStamped { header, .. })) = self;
+        stamp_ns(&header.stamp)
     }
 }
 
@@ -70,6 +83,9 @@ pub struct RefinementWorker {
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     pub(super) streams: [StreamWatch; 2],
+    pub(super) acceptance: Acceptance,
+    /// topics with messages that could not be read: when that was said, and how many came since
+    unreadable: BTreeMap<&'static str, (Instant, u64)>,
     /// what stops the arm, and the samples
     pub(super) stops: Arc<StopState>,
     pub(super) fault: Option<String>,
@@ -117,6 +133,8 @@ impl RefinementWorker {
             session,
             waiting: Default::default(),
             streams: [StreamWatch::new(now), StreamWatch::new(now)],
+            acceptance: Acceptance::default(),
+            unreadable: BTreeMap::new(),
             stops,
             fault: None,
             lost_transform: None,
@@ -166,10 +184,7 @@ impl RefinementWorker {
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
             // samples have their time in their stamps; the port has this one
             Arrival::Clock(_) => {}
-            Arrival::Unreadable(topic, why) => {
-                warn!(topic, why, "a message could not be read");
-                self.session.counters.refuse("unreadable");
-            }
+            Arrival::Unreadable(topic, why) => self.count_unreadable(topic, &why),
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
@@ -177,6 +192,17 @@ impl RefinementWorker {
             Arrival::Shutdown => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
+    }
+
+    fn count_unreadable(&mut self, topic: &'static str, why: &str) {
+        self.session.counters.refuse("unreadable");
+        let now = self.setup.clock.now();
+        let (said, count) = self.unreadable.entry(topic).or_insert((now, 0));
+        *count += 1;
+        if *count == 1 && now == *said || now.saturating_duration_since(*said) >= UNREADABLE_EVERY {
+            warn!(topic, count, why, "messages could not be read");
+            (*said, *count) = (now, 0);
+        }
     }
 
     fn transforms(&mut self, message: &TFMessage, is_static: bool) {
@@ -190,7 +216,7 @@ impl RefinementWorker {
 
     fn message(&mut self, message: ArrivedMessage, at: Instant) {
         let stream = message.stream();
-        self.streams[stream].arrive(self.setup.clock.now());
+        self.streams[stream].arrive(self.setup.clock.now(), message.stamp_ns(), at);
         if self.stops.is_paused() || self.fault.is_some() {
             self.session.counters.paused += 1;
             return;
@@ -256,8 +282,12 @@ impl RefinementWorker {
             self.fault = Some(error.to_string());
         }
         let message = shifted(message, self.session.epoch.shift_ns);
-        let is_taken = message.stamp_ns() >= 0 && self.session.sync.push(self.resolver.placed(message));
-        if self.session.epoch.note(stream, message.stamp_ns(), is_taken) {
+        if !(0..END_OF_TIME_NS).contains(&message.stamp_ns()) {
+            self.session.counters.refuse("stamp");
+            return;
+        }
+        let is_taken = self.session.sync.push(self.resolver.placed(message));
+        if self.session.epoch.note(stream, message.stamp_ns(), is_taken, self.session.sync.newest_ns()) {
             warn!("the clock of both streams was set back: they are taken up where they are now");
             self.resolver.frames.forget_moving();
         }
@@ -317,9 +347,11 @@ impl RefinementWorker {
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.edits_sent) >= EDITS_EVERY {
             self.edits_sent = now;
-            if self.fault.is_none() && now.saturating_duration_since(self.sampled) >= RESTS_AFTER {
+            let rested = now.saturating_duration_since(self.sampled);
+            if self.fault.is_none() && rested >= RESTS_AFTER {
                 // the mesh goes on to what the patch knows by then: what is shown is not left behind
-                match self.session.engine.rest() {
+                let engine = &mut self.session.engine;
+                match if rested >= SETTLES_AFTER { engine.settle().map(drop) } else { engine.rest() } {
                     Ok(()) => self.note_changes(),
                     Err(error) => self.fail(&error),
                 }

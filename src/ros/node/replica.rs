@@ -98,8 +98,10 @@ pub struct MeshVersion {
     pub stamp_ns: i64,
     positions: Vec<Point3<f64>>,
     support: Vec<Option<Support>>,
+    /// faces at each vertex: what no face uses is not shown
+    uses: Vec<u32>,
     corners: Vec<[u32; 3]>,
-    /// of the vertices and of the faces that there are
+    /// of the vertices that faces use, and of the faces
     pub counts: [u32; 2],
 }
 
@@ -109,44 +111,73 @@ impl MeshVersion {
         let slots = scan.vertex_slots() as u32;
         let is_there = |vertex| scan.has_vertex(VertexId(vertex)).then_some(Support::Scan);
         let mut corners = vec![NO_FACE; scan.face_slots()];
-        scan.faces().for_each(|(face, ours)| corners[face.0 as usize] = ours.map(|v| v.0));
+        let mut uses = vec![0; scan.vertex_slots()];
+        for (face, ours) in scan.faces() {
+            corners[face.0 as usize] = ours.map(|v| v.0);
+            ours.iter().for_each(|v| uses[v.0 as usize] += 1);
+        }
+        let used = uses.iter().filter(|uses| **uses > 0).count();
         Self {
             session: session.to_owned(),
             version: 1,
             stamp_ns: 0,
             positions: scan.positions().to_vec(),
             support: (0..slots).map(is_there).collect(),
+            uses,
             corners,
-            counts: [scan.vertex_count() as u32, scan.face_count() as u32],
+            counts: [used as u32, scan.face_count() as u32],
         }
     }
 
-    /// Takes changes up.
-    pub fn apply(&mut self, edits: &Edits) {
+    /// Takes changes up; vertices that faces have begun to use, or use no more.
+    pub fn apply(&mut self, edits: &Edits) -> Vec<u32> {
         for &(vertex, place) in &edits.vertices {
+            self.make_room(vertex);
             let at = vertex as usize;
-            if at >= self.positions.len() {
-                self.positions.resize(at + 1, Point3::origin());
-                self.support.resize(at + 1, None);
-            }
-            let was_there = self.support[at].is_some();
             self.support[at] = place.map(|(_, support)| support);
             if let Some((position, _)) = place {
                 self.positions[at] = position;
             }
-            self.counts[0] = self.counts[0] + u32::from(place.is_some()) - u32::from(was_there);
         }
+        let mut turned = Vec::new();
         for &(face, corners) in &edits.faces {
             let at = face as usize;
             if at >= self.corners.len() {
                 self.corners.resize(at + 1, NO_FACE);
             }
-            let was_there = self.corners[at] != NO_FACE;
-            self.corners[at] = corners.unwrap_or(NO_FACE);
-            self.counts[1] = self.counts[1] + u32::from(corners.is_some()) - u32::from(was_there);
+            let was = std::mem::replace(&mut self.corners[at], corners.unwrap_or(NO_FACE));
+            let was = (was != NO_FACE).then_some(was);
+            self.counts[1] = self.counts[1] + u32::from(corners.is_some()) - u32::from(was.is_some());
+            for vertex in corners.into_iter().flatten() {
+                self.make_room(vertex);
+                let uses = &mut self.uses[vertex as usize];
+                *uses += 1;
+                if *uses == 1 {
+                    self.counts[0] += 1;
+                    turned.push(vertex);
+                }
+            }
+            for vertex in was.into_iter().flatten() {
+                let uses = &mut self.uses[vertex as usize];
+                *uses -= 1;
+                if *uses == 0 {
+                    self.counts[0] -= 1;
+                    turned.push(vertex);
+                }
+            }
         }
         if edits.is_complete {
             (self.version, self.stamp_ns) = (edits.version, edits.stamp_ns);
+        }
+        turned
+    }
+
+    fn make_room(&mut self, vertex: u32) {
+        let slots = vertex as usize + 1;
+        if slots > self.positions.len() {
+            self.positions.resize(slots, Point3::origin());
+            self.support.resize(slots, None);
+            self.uses.resize(slots, 0);
         }
     }
 
@@ -155,10 +186,11 @@ impl MeshVersion {
         [self.positions.len() as u32, self.corners.len() as u32]
     }
 
-    /// Place of a vertex, m, and what it rests on; `None` where there is none.
+    /// Place of a vertex, m, and what it rests on; `None` where there is none, or no face uses it.
     pub fn vertex(&self, vertex: u32) -> Option<(Point3<f64>, Support)> {
         let at = vertex as usize;
-        Some((*self.positions.get(at)?, (*self.support.get(at)?)?))
+        let is_used = self.uses.get(at).is_some_and(|uses| *uses > 0);
+        is_used.then_some((*self.positions.get(at)?, (*self.support.get(at)?)?))
     }
 
     /// Corners of a face; `None` where there is none.
@@ -227,12 +259,13 @@ impl MeshReplica {
         *announced = (announced.0 + 1, 1);
     }
 
-    /// Takes changes up.
-    pub fn apply(&self, edits: &Edits) {
+    /// Takes changes up; as [`MeshVersion::apply`].
+    pub fn apply(&self, edits: &Edits) -> Vec<u32> {
         let mut state = locked(&self.state);
-        Arc::make_mut(&mut state.mesh).apply(edits);
+        let turned = Arc::make_mut(&mut state.mesh).apply(edits);
         state.is_complete = edits.is_complete;
         self.answer(&mut state);
+        turned
     }
 
     /// Goes over to another session.

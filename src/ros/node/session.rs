@@ -190,7 +190,7 @@ impl NodeSession {
     }
 
     /// Everything that was not taken, by reason; those of poses begin with `pose_`.
-    fn refused(&self) -> BTreeMap<String, u64> {
+    pub fn refused(&self) -> BTreeMap<String, u64> {
         let mut refused: BTreeMap<_, _> =
             self.counters.refused.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect();
         for (counts, prefix) in [(self.sync.counts(), ""), (self.sync.pose_counts(), "pose_")] {

@@ -9,6 +9,8 @@ const RATE_OVER: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct StreamWatch {
     last: Option<Instant>,
+    /// stamp of the last one, ns, and when it came
+    stamped: Option<(i64, Instant)>,
     /// messages so far
     pub arrived: u64,
     /// times that it was stale
@@ -23,12 +25,24 @@ pub struct StreamWatch {
 impl StreamWatch {
     /// Nothing came yet.
     pub fn new(now: Instant) -> Self {
-        Self { last: None, arrived: 0, gaps: 0, is_stale: true, since: now, arrived_since: 0, rate_hz: 0.0 }
+        Self {
+            last: None,
+            stamped: None,
+            arrived: 0,
+            gaps: 0,
+            is_stale: true,
+            since: now,
+            arrived_since: 0,
+            rate_hz: 0.0,
+        }
     }
 
     /// A message came.
-    pub fn arrive(&mut self, now: Instant) {
+    ///
+    /// - `stamp_ns`: as its header has it, where that is a time; `at`: when the port had it.
+    pub fn arrive(&mut self, now: Instant, stamp_ns: Option<i64>, at: Instant) {
         self.last = Some(now);
+        self.stamped = stamp_ns.map(|stamp_ns| (stamp_ns, at));
         self.is_stale = false;
         self.arrived += 1;
     }
@@ -44,6 +58,19 @@ impl StreamWatch {
             (self.since, self.arrived_since) = (now, self.arrived);
         }
         is_stale
+    }
+
+    /// Whether the last one has no stamp: the header was not filled.
+    pub fn is_unstamped(&self) -> bool {
+        self.stamped.is_some_and(|(stamp_ns, _)| stamp_ns == 0)
+    }
+
+    /// How far the stamps of this stream are beyond those that come on the other at the same time, s; `None` before both have come.
+    pub fn stamped_beyond(&self, other: &Self) -> Option<f64> {
+        let ((ours_ns, ours), (theirs_ns, theirs)) = (self.stamped?, other.stamped?);
+        let between =
+            ours.saturating_duration_since(theirs).as_secs_f64() - theirs.saturating_duration_since(ours).as_secs_f64();
+        Some((ours_ns as f64 - theirs_ns as f64) * 1e-9 - between)
     }
 
     /// How long ago the last one came; `None` before the first.
@@ -73,10 +100,12 @@ const BETWEEN_NS: i64 = 61_000_000_000;
 impl Epoch {
     /// What became of a message of stream 0 or 1 with this stamp, as shifted. Returns whether a new epoch begins: then the
     /// message after it is to be shifted by another amount.
-    pub fn note(&mut self, stream: usize, stamp_ns: i64, is_taken: bool) -> bool {
+    ///
+    /// - `newest_ns`: of both streams, as kept for good: a stamp that leaps and is given up again is none.
+    pub fn note(&mut self, stream: usize, stamp_ns: i64, is_taken: bool, newest_ns: Option<i64>) -> bool {
+        self.newest_ns = self.newest_ns.max(newest_ns.unwrap_or(0));
         if is_taken {
             self.late = [0; 2];
-            self.newest_ns = self.newest_ns.max(stamp_ns);
             return false;
         }
         let is_behind = stamp_ns < self.newest_ns;
@@ -105,12 +134,27 @@ mod tests {
         assert!(stream.check(begun, stale) && stream.gaps == 0, "what never came is no gap");
         for round in 1..=3u32 {
             let came = begun + round * 1000 * MS;
-            stream.arrive(came);
+            stream.arrive(came, None, came);
             assert!(!stream.check(came, stale) && !stream.check(came + stale, stale));
             assert_eq!((stream.gaps, stream.age(came + stale)), (u64::from(round) - 1, Some(stale)));
             assert!(stream.check(came + stale + MS, stale) && stream.check(came + 3 * stale, stale));
             assert_eq!(stream.gaps, u64::from(round));
         }
+    }
+
+    /// Worked by hand: the wrench comes 2 ms after the pose, and is stamped 5 s and 2 ms later.
+    #[test]
+    fn stamps_are_compared_at_the_same_time() {
+        let begun = Instant::now();
+        let [mut poses, mut wrenches] = [StreamWatch::new(begun), StreamWatch::new(begun)];
+        poses.arrive(begun, Some(1_000_000_000), begun);
+        assert_eq!(poses.stamped_beyond(&wrenches), None);
+        wrenches.arrive(begun + 3 * MS, Some(6_002_000_000), begun + 2 * MS);
+        assert!((poses.stamped_beyond(&wrenches).unwrap() + 5.0).abs() < 1e-9);
+        assert!((wrenches.stamped_beyond(&poses).unwrap() - 5.0).abs() < 1e-9);
+        assert!(!poses.is_unstamped());
+        poses.arrive(begun, Some(0), begun);
+        assert!(poses.is_unstamped());
     }
 
     #[test]
@@ -121,7 +165,7 @@ mod tests {
         for ms in 1..=3000u32 {
             // 1000 Hz, then 250 Hz, then nothing
             if ms <= 1000 || (ms <= 2000 && ms % 4 == 0) {
-                stream.arrive(begun + ms * MS);
+                stream.arrive(begun + ms * MS, None, begun + ms * MS);
             }
             stream.check(begun + ms * MS, 100 * MS);
             if ms % 1000 == 0 {

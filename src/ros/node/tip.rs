@@ -47,6 +47,13 @@ pub fn markers(tip: &LastTip, features: &FeatureArray, next: &NextTouches, frame
     MarkerArray { markers: vec![ball, text, arrow(2, closest), arrow(3, there)] }
 }
 
+/// Takes all of [`markers`] away.
+pub fn no_markers(frame: &str) -> MarkerArray {
+    let gone =
+        |id| Marker { header: header(0, frame), ns: "tip".to_owned(), id, action: Marker::DELETE, ..Marker::default() };
+    MarkerArray { markers: (0..4).map(gone).collect() }
+}
+
 /// Length of the arrow onto the next place, m.
 const NEXT_LENGTH: f64 = 10e-3;
 

@@ -76,14 +76,15 @@ impl View {
             }
         }
         self.tick(true);
+        // nobody moves it any more
+        self.port.publish(Publication::Tip(tip::no_markers(&self.shared.frame)));
         self.shared.mesh.close();
     }
 
     fn take(&mut self, input: ViewInput) {
         match input {
             ViewInput::Edits(edits) => {
-                self.shared.mesh.apply(&edits);
-                self.patches.note(&edits);
+                self.patches.note(&edits, &self.shared.mesh.apply(&edits));
                 edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
                 edits.faces.iter().for_each(|(face, _)| self.tiles.forget_mismatch(*face));
                 // as many come back as went out

@@ -3,3 +3,4 @@ mod cell;
 mod files;
 mod samples;
 mod stops;
+mod truth;

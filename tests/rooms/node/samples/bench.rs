@@ -167,6 +167,15 @@ impl Bench {
 
     /// As they came: between them as much time passes as their stamps say.
     pub fn play<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
+        self.play_as(messages, |message| vec![self.arrival(message)]);
+    }
+
+    /// As [`Self::play`], with what arrives instead of each message.
+    pub fn play_as<'a>(
+        &self,
+        messages: impl IntoIterator<Item = &'a Message>,
+        mut arrivals: impl FnMut(&Message) -> Vec<Arrival>,
+    ) {
         let mut due_ns = None;
         for message in messages {
             let due_ns = due_ns.get_or_insert(message.stamp_ns());
@@ -175,7 +184,7 @@ impl Bench {
                 self.hand.advance(STEP);
                 *due_ns += STEP.as_nanos() as i64;
             }
-            assert!(self.world.arrive_patiently(self.arrival(message)));
+            arrivals(message).into_iter().for_each(|arrival| assert!(self.world.arrive_patiently(arrival)));
         }
         self.taken();
     }

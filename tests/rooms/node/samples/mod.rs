@@ -1,7 +1,7 @@
 //! The node without any network: what it makes of what arrives, in whatever order, and what others see of it.
 
 pub mod bench;
-mod follower;
+pub mod follower;
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
