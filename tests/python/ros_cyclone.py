@@ -239,6 +239,55 @@ class DiagnosticArray:
     status: sequence[DiagnosticStatus]
 
 
+@message("rcl_interfaces/msg/Log")
+class Log:
+    stamp: Time
+    level: uint8
+    name: str
+    msg: str
+    file: str
+    function: str
+    line: uint32
+
+
+@message("touchup_msgs/msg/MeshPatch")
+class MeshPatch:
+    header: Header
+    session: str
+    version: uint64
+    base_version: uint64
+    part: uint32
+    part_count: uint32
+    removed_faces: sequence[uint32]
+    vertices: sequence[uint32]
+    positions: sequence[float32]
+    variance: sequence[float32]
+    support: sequence[uint8]
+    faces: sequence[uint32]
+    corners: sequence[uint32]
+    removed_vertices: sequence[uint32]
+    vertex_count: uint32
+    face_count: uint32
+
+
+@message("touchup_msgs/srv/ResyncMesh_Request")
+class ResyncMeshRequest:
+    guid: uint64
+    seq: int64
+    session: str
+    version: uint64
+
+
+@message("touchup_msgs/srv/ResyncMesh_Response")
+class ResyncMeshResponse:
+    guid: uint64
+    seq: int64
+    success: bool
+    message: str
+    session: str
+    version: uint64
+
+
 @message("rcl_interfaces/msg/ParameterValue")
 class ParameterValue:
     type: uint8

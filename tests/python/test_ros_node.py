@@ -1,8 +1,10 @@
 """`touchup node` and `touchup replay` as two processes: the same result as `touchup refine`, whatever happens to them."""
 
 import contextlib
+import itertools
 import json
 import os
+import random
 import signal
 import subprocess
 
@@ -16,18 +18,34 @@ from mcap_ros2.decoder import DecoderFactory
 from ros_cyclone import (
     BEST_EFFORT,
     LATCHED,
+    RELIABLE,
+    DiagnosticArray,
     HapticMismatch,
+    Header,
+    Log,
     Marker,
+    MeshPatch,
     Peer,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    ResyncMeshRequest,
+    ResyncMeshResponse,
     SaveMeshRequest,
     SaveMeshResponse,
+    Time,
     UndoRequest,
     UndoResponse,
+    Vector3,
+    Wrench,
+    WrenchStamped,
 )
 from ros_domains import domains
 from ros_player import in_step, play_in_step
 from ros_process import Client, Node, Process
 from scipy.spatial import KDTree
+from test_ros_follower import Follower
 
 
 @pytest.fixture
@@ -147,6 +165,84 @@ def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, d
 
         node.wait_for(is_what_was_saved)
         assert node.end() in (0, 4), node.text()
+
+
+def in_order(vertices, faces):
+    """A mesh as it is however its vertices and faces are numbered: places as float32 in m, faces by their places."""
+    places = {vertex: tuple(float(numpy.float32(x)) for x in place[:3]) for vertex, place in vertices}
+    turned = []
+    for corners in faces:
+        at = [places[int(corner)] for corner in corners]
+        turned.append(min(tuple(at[k:] + at[:k]) for k in range(3)))
+    return numpy.array(sorted(turned), numpy.float32).tobytes()
+
+
+def test_a_follower_that_loses_messages_has_the_bytes_that_are_saved(demo_folder, tmp_path, touchup_bin, domain):
+    scene, pick = scene_for(demo_folder, tmp_path), random.Random(5)
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
+        save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
+        resync = Client(node, domain, "resync_mesh", ResyncMeshRequest, ResyncMeshResponse)
+        reader = Peer(domain).reader("/mesh_patch", MeshPatch, RELIABLE)
+        follower = Follower(lambda: resync.ask("", 0))
+        save.introduce("../nowhere.ply", False, False)
+        resync.introduce("", 0)
+        play_in_step(node, demo_folder / "touch.mcap", domain)
+        lost, versions = 0, []
+
+        def follows(loss):
+            nonlocal lost
+            for patch in reader.take(1000):
+                if pick.random() < loss:
+                    lost += 1
+                else:
+                    follower.take(patch)
+            follower.tick()
+            return not follower.is_waiting
+
+        node.wait_for(lambda: follows(0.1) or lost > 5)
+
+        def is_saved():
+            follows(0.0)
+            answer = save.ask(f"try{len(versions)}.ply", False, False)
+            versions.append(answer.mesh_version)
+            return answer.mesh_version == follower.version != 0 and answer
+
+        answer = []
+        node.wait_for(lambda: answer.append(is_saved()) or answer[-1])
+        assert lost > 0
+        assert (answer[-1].vertex_count, answer[-1].face_count) == (len(follower.vertices), len(follower.faces))
+        saved = trimesh.load(answer[-1].path, process=False)
+        of_file = in_order(enumerate(numpy.asarray(saved.vertices) * 1e-3), saved.faces)
+        assert of_file == in_order(follower.vertices.items(), follower.faces.values())
+        assert node.end() in (0, 4), node.text()
+
+
+def test_samples_that_are_not_used_are_a_warning_on_diagnostics_and_rosout(demo_folder, tmp_path, touchup_bin, domain):
+    scene = scene_for(demo_folder, tmp_path)
+    ros = ["-r", "__ns:=/cell_b", *CYCLONE]
+    options = {"domain": domain, "ros": ros, "environment": {"ROS_STATIC_PEERS": "192.0.2.7"}}
+    with Node(touchup_bin, tmp_path, "--scene", scene, **options) as node:
+        peer = Peer(domain)
+        logs, states = peer.reader("/rosout", Log, RELIABLE), peer.reader("/diagnostics", DiagnosticArray, RELIABLE)
+        wrenches = peer.writer("/cell_b/stylus/wrench", WrenchStamped, BEST_EFFORT)
+        poses = peer.writer("/cell_b/stylus/pose", PoseStamped, BEST_EFFORT)
+        said, shown, number = [], [], itertools.count(1)
+
+        def is_said():
+            for at in itertools.islice(number, 10):
+                header = Header(Time(1_700_000_000, at * 1_000_000), "")
+                wrenches.write(WrenchStamped(header, Wrench(Vector3(0, 0, 1), Vector3(0, 0, 0))))
+                poses.write(PoseStamped(header, Pose(Point(0, 0, 0), Quaternion(0, 0, 0, 1))))
+            said.extend(log for log in logs.take(100) if "frame_id" in log.msg)
+            shown.extend(status for array in states.take(100) for status in array.status if "frame_id" in status.message)
+            return said and shown
+
+        node.wait_for(is_said)
+        assert (said[0].name, said[0].level) == ("cell_b.touchup", 30)
+        assert (shown[0].name, shown[0].level) == ("cell_b/touchup: session", 1)
+        assert "/cell_b/touchup" in shown[0].hardware_id
+        assert node.end() in (0, 3, 4), node.text()
+        assert "ROS_STATIC_PEERS=192.0.2.7 is not heeded" in node.text()
 
 
 def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
