@@ -8,7 +8,7 @@
 //!
 //! | crate | modules |
 //! |---|---|
-//! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`align`] [`compare`] [`calibrate`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
+//! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`align`] [`compare`] [`calibrate`] [`diagnose`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`scene`], [`replay`], [`live`], [`session`] |
@@ -21,7 +21,7 @@
 #[doc = include_str!("../docs/method.md")]
 struct MethodPage;
 
-pub use touchup_core::{align, calibrate, compare, features, haptic, mesh, probing, reconstruct, stylus};
+pub use touchup_core::{align, calibrate, compare, diagnose, features, haptic, mesh, probing, reconstruct, stylus};
 pub use touchup_session::{clock, live, replay, scene, session};
 pub use {touchup_io as io, touchup_sim as sim};
 

@@ -12,6 +12,7 @@ mod compare;
 mod demo;
 mod demo_robot;
 mod disagree;
+mod doctor;
 mod error;
 mod features;
 mod found;
@@ -94,6 +95,8 @@ enum Verb {
     Compare(compare::CompareArguments),
     /// Finds where touch and scan disagree, and whether scanner, part or touch is to blame
     Disagree(disagree::DisagreeArguments),
+    /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that it touched
+    Doctor(doctor::DoctorArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
@@ -161,6 +164,7 @@ impl Verb {
             Self::Compare(arguments) => compare::compare(arguments),
             Self::Demo(arguments) => demo::demo(arguments),
             Self::Disagree(arguments) => disagree::disagree(arguments),
+            Self::Doctor(arguments) => doctor::doctor(arguments),
             Self::Refine(arguments) => refine::refine(arguments),
             Self::Features(arguments) => features::features(arguments),
             Self::Probe(arguments) => probe::probe(arguments),

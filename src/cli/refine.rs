@@ -319,6 +319,7 @@ impl RefineArguments {
             scene.sync_params(),
             markers,
             &mut || progress.step(),
+            &mut |_| (),
             |sample| {
                 change_strokes(sample.stamp_ns, &mut rates);
                 pushes.push(&mut rates, sample);

@@ -26,6 +26,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),
     ("calibrate", "numeric stylus mesh align"),
+    ("diagnose", "numeric stylus mesh"),
     ("io", "parameters stylus mesh features align arm execute"),
     ("scene", "parameters stylus mesh reconstruct haptic plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
@@ -40,8 +41,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
-        "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare io \
-         scene session replay ros ros2_control ur",
+        "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare \
+         diagnose io scene session replay ros ros2_control ur",
     ),
 ];
 

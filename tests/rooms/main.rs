@@ -21,6 +21,7 @@ mod allocations;
 mod calibrate;
 mod cli;
 mod compare;
+mod diagnose;
 mod features;
 mod haptic;
 mod io;

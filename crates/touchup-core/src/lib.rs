@@ -15,6 +15,7 @@
 //! | [`align`] | rigid registration: of pairs, of features, of surfaces |
 //! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |
 //! | [`calibrate`] | payload and tip calibration, registration of the scan |
+//! | [`diagnose`] | whether scan and touches belong together |
 //! | [`probing::plan`] | next-touch planning |
 //! | [`probing::arm`] | an arm that holds a probe: kinematics, limits, onset of a contact |
 //! | [`probing::execute`] | from a flag to a feature with an arm |
@@ -37,6 +38,7 @@
 pub mod align;
 pub mod calibrate;
 pub mod compare;
+pub mod diagnose;
 pub mod features;
 pub mod haptic;
 pub mod mesh;

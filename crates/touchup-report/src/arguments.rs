@@ -208,7 +208,7 @@ impl ReportArguments {
         let no_refine = || CommandError::Usage("the scene names no `refine`: add `refine:` to it".to_owned());
         let params = scene.refine_params(recording.wrench_frame).ok_or_else(no_refine)?;
         let mut samples = Vec::new();
-        each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, |sample| {
+        each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, &mut |_| (), |sample| {
             samples.push(*sample)
         })?;
         Ok(Some(GivenPart {

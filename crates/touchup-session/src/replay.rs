@@ -153,6 +153,7 @@ pub fn each_message(
 ///
 /// - `placement`: brings each message into the frames of the scene.
 /// - `markers`: makes the poses of a recording that holds markers.
+/// - `at_message`: takes each message as it came, before it is placed and paired.
 ///
 /// # Errors
 /// As [`each_message`].
@@ -162,12 +163,14 @@ pub fn each_sample(
     sync: SyncParams,
     markers: Option<MarkerFilter>,
     at_each: &mut dyn FnMut(),
+    at_message: &mut dyn FnMut(&Message),
     mut each: impl FnMut(&Sample),
 ) -> Result<Replayed, ReplayError> {
     let mut sync = Synchroniser::new(sync)?;
     placement.iter().try_for_each(Placement::check)?;
     let wrench_frame = recording.wrench_frame;
     let mut replayed = each_message(recording, markers, at_each, |message| {
+        at_message(&message);
         sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
         std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     })?;

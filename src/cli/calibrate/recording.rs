@@ -38,6 +38,6 @@ impl CalibrationRecording {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
         let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut || progress.step(), each)?)
+        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut || progress.step(), &mut |_| (), each)?)
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero. Along the force, its
 //! centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force rises as A (1 − e^(−(t − t₁)/T)). The
-//! delay is δ = t₁ − t₀. Each onset gives the profile of its least squares over δ; all of them together give δ, and how
-//! much they differ gives its uncertainty.
+//! delay is δ = t₁ − t₀. Within ± 120 ms, the δ is searched at which the ball loses most speed along the force, on the mean
+//! of all onsets; around that, each onset gives the profile of its least squares over δ. All of them together give δ, and
+//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as strong, nothing is said.
 
 use std::collections::VecDeque;
 
@@ -11,7 +12,7 @@ use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use super::{ContactSample, SettingError};
-use crate::numeric::NormalEquations;
+use crate::numeric::{NormalEquations, median};
 
 /// What the clock of the wrench reads beyond that of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -24,25 +25,38 @@ pub struct ClockOffset {
     pub onsets: usize,
 }
 
-/// Of an onset, on each side of the instant at which the gate opens, ns.
-const BEFORE_NS: i64 = 25_000_000;
-const AFTER_NS: i64 = 15_000_000;
+/// Of a stop, on each side of it, s.
+const BEFORE: f64 = 25e-3;
+const AFTER: f64 = 15e-3;
+/// A contact that begins sooner after the last one ended is no onset, ns.
+const CALM_NS: i64 = 25_000_000;
+/// Delays that are searched, s.
+const SEARCHED: f64 = 0.12;
+const SEARCH_STEP: f64 = 1e-3;
+const SEARCHED_STEPS: usize = 2 * (SEARCHED / SEARCH_STEP) as usize + 1;
+/// What is kept of an onset, on each side of the instant at which the gate opens, ns.
+const BEFORE_NS: i64 = 160_000_000;
+const AFTER_NS: i64 = 150_000_000;
+/// Two stops that are this far apart are two, s.
+const APART: f64 = 20e-3;
+/// The second stop has this share of the first at most.
+const SECOND_STOP: f64 = 0.7;
 /// The force's rise is fitted from this long before the gate opens, s …
 const RISE_BEFORE: f64 = 8e-3;
 /// … to this long after, s: later the hand changes its motion.
 const RISE_AFTER: f64 = 8e-3;
-/// Delays that are tried: ± [`REACH`] steps of [`STEP`] s.
+/// Delays that are tried around the one that was searched: ± [`REACH`] steps of [`STEP`] s.
 const REACH: usize = 48;
 const STEP: f64 = 0.25e-3;
 const DELAYS: usize = 2 * REACH + 1;
-/// Samples of an onset: 1 kHz has 40, 4 kHz would have 160.
-const MOST_SAMPLES: usize = 256;
+/// Samples of an onset: 1 kHz has 310, 4 kHz would have 1240.
+const MOST_SAMPLES: usize = 1536;
 /// With fewer there is no line to fit.
 const LEAST_SAMPLES: usize = 16;
 /// An onset at which the ball loses less speed than this is not used, m/s.
 const LEAST_STOP: f64 = 15e-3;
-/// Onsets that are kept; later ones take the place of the first.
-const MOST_ONSETS: usize = 512;
+/// Onsets that are kept, 4 MB at 4 kHz; later ones take the place of the first.
+const MOST_ONSETS: usize = 128;
 /// Fewer do not determine their spread.
 const LEAST_ONSETS: usize = 8;
 /// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
@@ -62,7 +76,14 @@ pub struct ClockEstimator {
     onset_ns: Option<i64>,
     /// between two samples, at the last onset, s
     period: f64,
-    onsets: VecDeque<Profile>,
+    onsets: VecDeque<Onset>,
+}
+
+/// The samples around the instant at which the gate opens, and when the force begins, s after that.
+#[derive(Clone, Debug)]
+struct Onset {
+    samples: Vec<OnsetSample>,
+    begun: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -99,17 +120,19 @@ impl ClockEstimator {
         self.held.push_back(OnsetEntry { stamp_ns: tip.stamp_ns, position, force_o: tip.force_o });
         if self.onset_ns.is_some_and(|onset_ns| tip.stamp_ns - onset_ns >= AFTER_NS)
             && let Some(onset_ns) = self.onset_ns.take()
-            && let Some(profile) = self.profile(onset_ns)
+            && let Some(onset) = self.onset(onset_ns)
         {
             if self.onsets.len() == MOST_ONSETS {
                 self.onsets.pop_front();
             }
-            self.onsets.push_back(profile);
+            self.onsets.push_back(onset);
             self.period = self.mean_period();
         }
         if was_in_contact != is_in_contact {
-            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns - turned_ns >= BEFORE_NS);
-            self.onset_ns = (is_in_contact && was_calm).then_some(tip.stamp_ns);
+            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns - turned_ns >= CALM_NS);
+            if is_in_contact && was_calm && self.onset_ns.is_none() {
+                self.onset_ns = Some(tip.stamp_ns);
+            }
             self.turned_ns = Some(tip.stamp_ns);
         }
     }
@@ -119,7 +142,13 @@ impl ClockEstimator {
         if self.onsets.len() < LEAST_ONSETS {
             return None;
         }
-        let sum: Profile = std::array::from_fn(|at| self.onsets.iter().map(|profile| profile[at]).sum());
+        let coarse = self.searched()?;
+        let bend = 1.0 / self.stiffness.unwrap_or(f64::INFINITY);
+        let profiles: Vec<Profile> = self.onsets.iter().filter_map(|onset| onset.profile(coarse, bend)).collect();
+        if profiles.len() < LEAST_ONSETS {
+            return None;
+        }
+        let sum: Profile = std::array::from_fn(|at| profiles.iter().map(|profile| profile[at]).sum());
         let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
         // slopes over ±3 steps: the rounding of single samples is smoother than that
         const SPAN: usize = 3;
@@ -133,11 +162,29 @@ impl ClockEstimator {
             return None;
         }
         let shift = -slope(&sum) / bend;
-        let mean_slope = slope(&sum) / self.onsets.len() as f64;
-        let scatter: f64 = self.onsets.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
+        let mean_slope = slope(&sum) / profiles.len() as f64;
+        let scatter: f64 = profiles.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
         let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
-        let offset = (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, onsets: self.onsets.len() })
+        let offset = coarse + (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, onsets: profiles.len() })
+    }
+
+    /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it stops at two of them.
+    fn searched(&self) -> Option<f64> {
+        let at_step = |step: usize| (step as f64 - (SEARCHED_STEPS / 2) as f64) * SEARCH_STEP;
+        let stops: Vec<f64> = (0..SEARCHED_STEPS)
+            .map(|step| {
+                let mut stops: Vec<f64> = self.onsets.iter().filter_map(|onset| onset.stop(at_step(step))).collect();
+                let is_seen = stops.len() >= LEAST_ONSETS.max(self.onsets.len() / 2);
+                // the median: what one onset does, as the ball leaving an edge, is not the clock's
+                if is_seen { median(&mut stops).unwrap_or(0.0) } else { 0.0 }
+            })
+            .collect();
+        let best = (0..SEARCHED_STEPS).max_by(|&a, &b| stops[a].total_cmp(&stops[b]))?;
+        let apart = (APART / SEARCH_STEP) as usize;
+        let second = (0..SEARCHED_STEPS).filter(|step| step.abs_diff(best) > apart).map(|step| stops[step]);
+        let is_alone = second.fold(0.0, f64::max) <= SECOND_STOP * stops[best];
+        (is_alone && stops[best] >= LEAST_STOP).then(|| at_step(best))
     }
 
     /// Between the samples that are held, s.
@@ -148,30 +195,60 @@ impl ClockEstimator {
     }
 
     /// `None` when the samples around the onset do not show one.
-    fn profile(&self, onset_ns: i64) -> Option<Profile> {
+    fn onset(&self, onset_ns: i64) -> Option<Onset> {
         let around = self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&(x.stamp_ns - onset_ns)));
-        let pressed: Vector3<f64> = around.clone().filter(|x| x.stamp_ns > onset_ns).map(|x| x.force_o).sum();
+        let of_press = |x: &&OnsetEntry| (0.0..=AFTER).contains(&((x.stamp_ns - onset_ns) as f64 * 1e-9));
+        let pressed: Vector3<f64> = around.clone().filter(of_press).map(|x| x.force_o).sum();
         let along = pressed.try_normalize(0.0)?;
         let of_entry = |x: &OnsetEntry| {
             let t = (x.stamp_ns - onset_ns) as f64 * 1e-9;
             OnsetSample { t, centre: x.position.dot(&along), force: x.force_o.dot(&along) }
         };
         let mut samples: Vec<OnsetSample> = around.map(of_entry).collect();
-        let count = samples.len();
-        if count < LEAST_SAMPLES || samples[0].t > -0.6e-9 * BEFORE_NS as f64 {
+        if samples.len() < LEAST_SAMPLES || samples[0].t > -0.6 * BEFORE {
             return None;
         }
         // far-off numbers do not lose the digits of a micrometre
-        let middle = samples[count / 2].centre;
+        let middle = samples[samples.len() / 2].centre;
         samples.iter_mut().for_each(|x| x.centre -= middle);
         let begun = force_begins(&samples)?;
-        let bend = 1.0 / self.stiffness.unwrap_or(f64::INFINITY);
+        Some(Onset { samples, begun })
+    }
+}
+
+impl Onset {
+    /// The samples around an instant; `None` where they do not cover it.
+    fn around(&self, t: f64) -> Option<&[OnsetSample]> {
+        let first = self.samples.partition_point(|x| x.t < t - BEFORE);
+        let end = self.samples.partition_point(|x| x.t <= t + AFTER);
+        let around = self.samples.get(first..end)?;
+        let is_covered = around.len() >= LEAST_SAMPLES
+            && around.first()?.t <= t - 0.6 * BEFORE
+            && around.last()?.t >= t + 0.6 * AFTER;
+        is_covered.then_some(around)
+    }
+
+    /// Speed along the force that the ball loses `delay` before the force begins, m/s.
+    fn stop(&self, delay: f64) -> Option<f64> {
+        let begun = self.begun - delay;
+        let row = |x: &OnsetSample| {
+            let t = x.t - begun;
+            (Vector3::new(1.0, t.min(0.0), t.max(0.0)), x.centre)
+        };
+        let solved = NormalEquations::of(self.around(begun)?.iter().map(row)).solution()?;
+        Some(solved.z - solved.y)
+    }
+
+    /// - `coarse`: the delay in the middle of the profile, s.
+    /// - `bend`: compliance of the stylus, m/N.
+    fn profile(&self, coarse: f64, bend: f64) -> Option<Profile> {
+        let around = self.around(self.begun - coarse)?;
         let mut profile = [0.0; DELAYS];
         let (mut stop, mut least) = (0.0, f64::INFINITY);
         for (at, out) in profile.iter_mut().enumerate() {
-            let delay = (at as f64 - REACH as f64) * STEP;
-            let (left, speeds) = kink(&samples, begun, delay, bend)?;
-            *out = 0.5 * count as f64 * left.max(f64::MIN_POSITIVE).ln();
+            let delay = coarse + (at as f64 - REACH as f64) * STEP;
+            let (left, speeds) = kink(around, &self.samples, self.begun, delay, bend)?;
+            *out = 0.5 * around.len() as f64 * left.max(f64::MIN_POSITIVE).ln();
             if left < least {
                 (least, stop) = (left, speeds[1] - speeds[0]);
             }
@@ -181,6 +258,7 @@ impl ClockEstimator {
 }
 
 /// A sample of an onset along the force.
+#[derive(Clone, Copy, Debug)]
 struct OnsetSample {
     /// s after the gate opened
     t: f64,
@@ -210,12 +288,14 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
 }
 
 /// The residual of the centre's path after a bent line is subtracted, and the speeds before and after the bend.
-fn kink(samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
+///
+/// - `around`: those of the stop, out of `samples`.
+fn kink(around: &[OnsetSample], samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
     let row = |x: &OnsetSample| {
         let t = x.t - (begun - delay);
         (Vector3::new(1.0, t.min(0.0), t.max(0.0)), x.centre + force_at(samples, x.t + delay) * bend)
     };
-    let equations = NormalEquations::of(samples.iter().map(row));
+    let equations = NormalEquations::of(around.iter().map(row));
     let solved = equations.solution()?;
     Some((equations.residual_square(&solved), [solved.y, solved.z]))
 }

@@ -78,7 +78,7 @@ fn replay(
 ) -> Measured<f64> {
     let (mut count, mut outcome) = (0, Ok(()));
     let (seconds, replayed) = timed(|| {
-        each_sample(Recording::open(path, topics)?, None, sync, None, &mut || {}, |sample| {
+        each_sample(Recording::open(path, topics)?, None, sync, None, &mut || {}, &mut |_| (), |sample| {
             count += 1;
             if outcome.is_ok() {
                 outcome = push(sample);

@@ -1,0 +1,78 @@
+//! What the forces alone say: rest, noise, and which samples press.
+
+use nalgebra::Vector3;
+
+use super::monitor::InputRecord;
+use crate::numeric::quantile;
+
+/// Samples that are tried as the rest.
+const REST_CANDIDATES: usize = 64;
+/// Share of all samples that lie around the rest at least.
+const REST_SHARE: f64 = 0.05;
+/// A force this many noises off the rest is one.
+const NOISES: f64 = 8.0;
+/// … and this share of the largest.
+const SHARE_OF_LARGEST: f64 = 0.25;
+
+/// Levels of the force in the axes of T, N.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ForceLevels {
+    /// where the force mostly is: of free motion, where there is any
+    pub rest_t: Vector3<f64>,
+    /// deviation of one axis
+    pub noise: f64,
+    /// 95th percentile of the distance from the rest
+    pub largest: f64,
+}
+
+impl ForceLevels {
+    /// The densest place of the forces is the rest: what presses scatters wider than what is free.
+    pub fn of(records: &[InputRecord], noise: f64) -> Self {
+        let forces: Vec<Vector3<f64>> = records.iter().map(InputRecord::force_t).collect();
+        let step = (forces.len() / REST_CANDIDATES).max(1);
+        let distances = |from: &Vector3<f64>| {
+            let mut distances: Vec<f64> = forces.iter().map(|force| (force - from).norm()).collect();
+            distances.sort_unstable_by(f64::total_cmp);
+            distances
+        };
+        let width = |from: &Vector3<f64>| quantile(&distances(from), REST_SHARE);
+        let candidates = forces.iter().step_by(step).map(|force| (width(force), *force));
+        let peak = candidates.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(Vector3::zeros, |(_, force)| force);
+        let reach = (4.0 * noise).max(1.5 * width(&peak));
+        let around: Vec<&Vector3<f64>> = forces.iter().filter(|force| (*force - peak).norm() <= reach).collect();
+        let rest_t = around.iter().copied().sum::<Vector3<f64>>() / around.len().max(1) as f64;
+        Self { largest: quantile(&distances(&rest_t), 0.95), rest_t, noise }
+    }
+
+    /// The same with a rest of zero.
+    pub fn without_rest(self, records: &[InputRecord]) -> Self {
+        let mut sizes: Vec<f64> = records.iter().map(|record| record.force_o.norm()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        Self { rest_t: Vector3::zeros(), largest: quantile(&sizes, 0.95), ..self }
+    }
+
+    fn off_rest(&self, record: &InputRecord) -> f64 {
+        (record.force_t() - self.rest_t).norm()
+    }
+
+    pub fn is_pressing(&self, record: &InputRecord) -> bool {
+        self.off_rest(record) > (NOISES * self.noise).max(SHARE_OF_LARGEST * self.largest)
+    }
+
+    pub fn is_resting(&self, record: &InputRecord) -> bool {
+        self.off_rest(record) <= (4.0 * self.noise).max(0.05 * self.largest)
+    }
+}
+
+/// The 47 axes that a right one can be taken for, and itself first: permutations of the three with signs.
+pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f64>> {
+    const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
+    ORDERS.into_iter().flat_map(|order| {
+        (0..8u8).map(move |signs| {
+            nalgebra::Matrix3::from_fn(|row, column| {
+                let sign = if signs >> row & 1 == 1 { -1.0 } else { 1.0 };
+                if order[row] == column { sign } else { 0.0 }
+            })
+        })
+    })
+}

@@ -1,0 +1,178 @@
+//! Where the ball is against the scan.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::{SIGMA_OF_MEDIAN, median};
+
+/// A noisy scan is this much off at most, m: a wider tolerance would hide a wrong unit.
+const LARGEST_TOLERANCE: f64 = 6e-3;
+/// … and no pose is better than this, m.
+const LEAST_TOLERANCE: f64 = 0.3e-3;
+/// Vertices that the noise is estimated from.
+const NOISE_VERTICES: usize = 4000;
+
+/// What the scan says of itself.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScanScale {
+    /// deviation of the vertices along the normal, m
+    pub noise: f64,
+    /// median edge, m
+    pub edge: f64,
+    /// half the diagonal of its box, m
+    pub extent: f64,
+}
+
+impl ScanScale {
+    /// Noise: how far a vertex is off the mean of its neighbours along its normal; for n independent neighbours that is σ √(1 + 1/n).
+    pub fn of(scan: &TriMesh) -> Self {
+        let step = (scan.vertex_slots() / NOISE_VERTICES).max(1);
+        let (mut off, mut edges) = (Vec::new(), Vec::new());
+        for vertex in (0..scan.vertex_slots()).step_by(step).map(|at| crate::mesh::VertexId(at as u32)) {
+            if !scan.has_vertex(vertex) {
+                continue;
+            }
+            let (mut sum, mut count, mut normal) = (Vector3::zeros(), 0.0, Vector3::zeros());
+            let at = scan.position(vertex);
+            for &face in scan.star(vertex) {
+                normal += scan.double_area_normal(face);
+                for corner in scan.corners(face).into_iter().filter(|&corner| corner != vertex) {
+                    let edge = scan.position(corner) - at;
+                    edges.push(edge.norm());
+                    (sum, count) = (sum + edge, count + 1.0);
+                }
+            }
+            if let Some(normal) = normal.try_normalize(0.0).filter(|_| count > 0.0) {
+                // each neighbour comes with two faces
+                off.push((sum / count).dot(&normal).abs() / (1.0 + 2.0 / count).sqrt());
+            }
+        }
+        let [low, high] = scan.bounds();
+        Self {
+            noise: SIGMA_OF_MEDIAN * median(&mut off).unwrap_or(0.0),
+            edge: median(&mut edges).unwrap_or(0.0),
+            extent: (high - low).norm() / 2.0,
+        }
+    }
+
+    /// How far the ball's centre may be from one radius off the surface, m.
+    ///
+    /// - `unit`: how many m the scan as it was read takes for one.
+    pub fn tolerance(&self, told_noise: f64, radius: f64, unit: f64) -> f64 {
+        let noise = self.noise.max(told_noise);
+        (3.0 * noise + 0.2 * self.edge + 0.1 * radius).clamp(LEAST_TOLERANCE * unit, LARGEST_TOLERANCE * unit)
+    }
+}
+
+/// Half the diagonal of a box around points, m.
+pub(super) fn extent_of(points: impl Iterator<Item = Point3<f64>>) -> f64 {
+    let mut bounds: Option<[Point3<f64>; 2]> = None;
+    for point in points {
+        let [low, high] = bounds.get_or_insert([point, point]);
+        (*low, *high) = (low.inf(&point), high.sup(&point));
+    }
+    bounds.map_or(0.0, |[low, high]| (high - low).norm() / 2.0)
+}
+
+/// How a set of ball centres lies on the scan.
+#[derive(Clone, Debug)]
+pub(super) struct BallFit {
+    /// median signed distance of the centre from the surface, m
+    pub distance: f64,
+    /// median deviation from that, m
+    pub scatter: f64,
+    /// share within the tolerance
+    pub share: f64,
+    /// of each centre, m
+    distances: Vec<f64>,
+    /// outward normal under each centre
+    pub normals: Vec<Vector3<f64>>,
+}
+
+/// Touches that follow each other share the same error of the scan: so many count as one.
+const ALIKE: f64 = 10.0;
+
+impl BallFit {
+    /// Standard uncertainty of the median distance of `count` centres, m.
+    pub fn error(&self, count: usize) -> f64 {
+        1.25 * SIGMA_OF_MEDIAN * self.scatter / (count as f64 / ALIKE).max(1.0).sqrt()
+    }
+
+    pub fn of(
+        scan: &TriMesh,
+        tree: &FaceTree,
+        centres: impl Iterator<Item = Point3<f64>>,
+        radius: f64,
+        tolerance: f64,
+    ) -> Self {
+        let mut distances = Vec::new();
+        let mut normals = Vec::new();
+        for centre in centres {
+            let Some(hit) = tree.closest(scan, &centre, f64::INFINITY) else { continue };
+            let off = centre - hit.point;
+            let normal = scan.normal(hit.face);
+            distances.push(off.norm().copysign(off.dot(&normal)));
+            normals.push(normal);
+        }
+        let residuals: Vec<f64> = distances.iter().map(|distance| (distance - radius).abs()).collect();
+        let within = residuals.iter().filter(|&&residual| residual <= tolerance).count();
+        let share = within as f64 / residuals.len().max(1) as f64;
+        let distance = median(&mut distances).unwrap_or(f64::INFINITY);
+        let mut scatters: Vec<f64> = distances.iter().map(|x| (x - distance).abs()).collect();
+        let scatter = median(&mut scatters).unwrap_or(f64::INFINITY);
+        Self { distance, scatter, share, distances, normals }
+    }
+
+    /// Share of the centres that are farther off the surface than `distance`, m, on whichever side: beside the part, and where the
+    /// scan has holes, the side is not known.
+    pub fn share_beyond(&self, distance: f64) -> f64 {
+        self.distances.iter().filter(|x| x.abs() > distance).count() as f64 / self.distances.len().max(1) as f64
+    }
+}
+
+/// What may have happened to all positions, and what brings them back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaceMistake {
+    /// of the positions
+    pub undo: Matrix3<f64>,
+    /// of the radius, in the unit of the scan as it was read
+    pub radius_factor: f64,
+    pub says: &'static str,
+    pub is_unit: bool,
+}
+
+/// Factors of length that a file or a driver is wrong by, and axes that are swapped.
+pub(super) fn place_mistakes() -> Vec<PlaceMistake> {
+    const UNITS: [(f64, f64, &str); 10] = [
+        (1e-3, 1.0, "the poses look like mm, and are read as m"),
+        (1e3, 1.0, "the poses look like km, and are read as m"),
+        (25.4e-3, 1.0, "the poses look like inches, and are read as m"),
+        (1e-2, 1.0, "the poses look like cm, and are read as m"),
+        (25.4, 25.4, "the scan looks like mm, and is read as inches"),
+        (1e3, 1e3, "the scan looks like mm, and is read as m"),
+        (1e-3, 1e-3, "the scan looks like m, and is read as mm"),
+        (1.0 / 25.4, 1.0 / 25.4, "the scan looks like inches, and is read as mm"),
+        (25.4e-3, 25.4e-3, "the scan looks like m, and is read as inches"),
+        (1e3 / 25.4, 1e3 / 25.4, "the scan looks like inches, and is read as m"),
+    ];
+    const SWAPPED: [([usize; 3], &str); 5] = [
+        ([1, 0, 2], "the positions fit with x and y swapped"),
+        ([0, 2, 1], "the positions fit with y and z swapped"),
+        ([2, 1, 0], "the positions fit with x and z swapped"),
+        ([1, 2, 0], "the positions fit with the axes in the order y, z, x"),
+        ([2, 0, 1], "the positions fit with the axes in the order z, x, y"),
+    ];
+    let units = UNITS.into_iter().map(|(scale, radius_factor, says)| PlaceMistake {
+        undo: Matrix3::identity() * scale,
+        radius_factor,
+        says,
+        is_unit: true,
+    });
+    let swapped = SWAPPED.into_iter().map(|(order, says)| PlaceMistake {
+        undo: Matrix3::from_fn(|row, column| f64::from(u8::from(order[row] == column))),
+        radius_factor: 1.0,
+        says,
+        is_unit: false,
+    });
+    units.chain(swapped).collect()
+}

@@ -1,0 +1,110 @@
+//! The stamps of the messages, before they are paired.
+
+use super::finding::{InputCause, InputFinding};
+use crate::numeric::median;
+use crate::stylus::Message;
+
+/// Periods that are kept.
+const MOST_PERIODS: usize = 2048;
+/// A stamp that goes back by more was not swapped on the way, ns.
+const GOES_BACK_NS: i64 = 1_000_000_000;
+/// Fewer messages say nothing.
+const FEWEST: u64 = 20;
+
+/// Stamps of one stream.
+#[derive(Clone, Debug, Default)]
+struct StreamStamps {
+    count: u64,
+    zeros: u64,
+    backs: u64,
+    span_ns: Option<[i64; 2]>,
+    last_ns: i64,
+    /// s
+    periods: Vec<f64>,
+}
+
+impl StreamStamps {
+    fn push(&mut self, stamp_ns: i64) {
+        self.count += 1;
+        self.zeros += u64::from(stamp_ns == 0);
+        if let Some([first_ns, newest_ns]) = &mut self.span_ns {
+            self.backs += u64::from(newest_ns.saturating_sub(stamp_ns) > GOES_BACK_NS);
+            if self.periods.len() < MOST_PERIODS {
+                self.periods.push(stamp_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
+            }
+            (*first_ns, *newest_ns) = ((*first_ns).min(stamp_ns), (*newest_ns).max(stamp_ns));
+        } else {
+            self.span_ns = Some([stamp_ns; 2]);
+        }
+        self.last_ns = stamp_ns;
+    }
+}
+
+/// Stamps of both streams.
+#[derive(Clone, Debug, Default)]
+pub(super) struct InputStamps {
+    poses: StreamStamps,
+    wrenches: StreamStamps,
+}
+
+impl InputStamps {
+    pub fn push(&mut self, message: &Message) {
+        let stream = if matches!(message, Message::Pose(_)) { &mut self.poses } else { &mut self.wrenches };
+        stream.push(message.stamp_ns());
+    }
+
+    /// - `largest_gap_ns`: between two poses that are interpolated.
+    pub fn findings(&self, largest_gap_ns: i64) -> Vec<InputFinding> {
+        let mut findings = Vec::new();
+        for (name, stream) in [("poses", &self.poses), ("wrenches", &self.wrenches)] {
+            if stream.count >= FEWEST && 2 * stream.zeros > stream.count {
+                findings.push(InputFinding::new(
+                    InputCause::ZeroStamps,
+                    true,
+                    format!("{} of {} {name} have the stamp 0", stream.zeros, stream.count),
+                    "have the driver fill header.stamp with the time of measurement",
+                ));
+            } else if stream.backs > 0 {
+                findings.push(InputFinding::new(
+                    InputCause::StampsGoBack,
+                    stream.backs > stream.count / 4,
+                    format!(
+                        "{} of {} {name} are stamped more than 1 s before an earlier one",
+                        stream.backs, stream.count
+                    ),
+                    "record with one steady clock; a recording that was started twice is two recordings",
+                ));
+            }
+        }
+        if !findings.is_empty() {
+            return findings;
+        }
+        if let (Some(poses), Some(wrenches)) = (self.poses.span_ns, self.wrenches.span_ns) {
+            let apart = (wrenches[0].saturating_sub(poses[1])).max(poses[0].saturating_sub(wrenches[1]));
+            if apart > 0 {
+                let later = wrenches[0].saturating_sub(poses[0]) as f64 * 1e-9;
+                findings.push(InputFinding::new(
+                    InputCause::TwoEpochs,
+                    true,
+                    format!("the wrenches are stamped {later:+.3} s beyond the poses: no instant has both"),
+                    "stamp both by one clock",
+                ));
+            }
+        }
+        let gap = largest_gap_ns as f64 * 1e-9;
+        let period = median(&mut self.poses.periods.clone()).unwrap_or(0.0);
+        if self.poses.count >= FEWEST && period > gap {
+            findings.push(InputFinding::new(
+                InputCause::SlowPoses,
+                true,
+                format!("poses come every {:.1} ms, and none is interpolated over {:.0} ms", period * 1e3, gap * 1e3),
+                "record poses faster; sync.largest_gap_ms allows more where the stylus moves slowly",
+            ));
+        }
+        findings
+    }
+
+    pub fn counts(&self) -> [u64; 2] {
+        [self.poses.count, self.wrenches.count]
+    }
+}

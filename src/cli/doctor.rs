@@ -1,0 +1,132 @@
+//! `touchup doctor`: what is wrong with a recording, before anything is made of it.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::progress::WorkProgress;
+use super::{CliError, Losses, print_report, require};
+use crate::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
+use crate::io::mesh_file::{MeshUnit, read_mesh};
+use crate::io::recording::Topics;
+use crate::mesh::FaceTree;
+use crate::replay::{Recording, each_sample, marker_filter};
+use crate::scene::Scene;
+use crate::stylus::{ContactEstimator, ContactEstimatorParams};
+
+#[derive(Debug, Args)]
+pub(super) struct DoctorArguments {
+    /// The scan: PLY, STL or OBJ
+    #[arg(value_name = "SCAN")]
+    scan: PathBuf,
+    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
+    #[arg(value_name = "RECORDING")]
+    recording: PathBuf,
+    /// Unit of the coordinates in the scan's file
+    #[arg(long, value_name = "U", default_value = "mm")]
+    mesh_unit: MeshUnit,
+    /// Names tip, frames, thresholds and pairing; the flags below override it
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    /// geometry_msgs/WrenchStamped: the wrench of the part on the stylus
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
+    wrench_topic: String,
+    /// geometry_msgs/PoseStamped: the centre of the ball
+    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
+    pose_topic: String,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose
+    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
+    markers_topic: Option<String>,
+    /// Radius of the ball, mm; needed where no scene names it
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    tip_radius_mm: Option<f64>,
+    /// Stiffness of stylus and holder at the ball, N/mm
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    stiffness_n_per_mm: Option<f64>,
+    /// Prints the findings as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Diagnosis {
+    /// whether nothing is surely wrong
+    is_sound: bool,
+    /// the surest first
+    findings: Vec<InputFinding>,
+}
+
+const NO_RADIUS: &str = "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene";
+
+/// The command: replays, prints a line for each finding, and fails at a sure one.
+pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
+    let scene = arguments.scene()?;
+    let scan = read_mesh(&arguments.scan, arguments.mesh_unit)?.mesh;
+    let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
+    let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
+    let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
+    let recording = Recording::open(&arguments.recording, &topics)?;
+    let tip = scene.tip_params();
+    let compensator = scene.compensator_params(recording.wrench_frame);
+    let contact = ContactEstimatorParams {
+        compensator,
+        gate: Some(scene.contact.unwrap_or_default()),
+        ..ContactEstimatorParams::new(tip)
+    };
+    let params = InputMonitorParams {
+        compensator,
+        tip,
+        shape: scene.tip_shape(),
+        scan_noise: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise),
+        contact_on: contact.gate.map(|gate| gate.on),
+        sync: scene.sync_params(),
+    };
+    let monitor = RefCell::new(InputMonitor::new(params)?);
+    let mut estimator = ContactEstimator::new(contact)?;
+    let mut progress = WorkProgress::new("replay", recording.message_count());
+    let replayed = each_sample(
+        recording,
+        scene.placement(),
+        params.sync,
+        markers,
+        &mut || progress.step(),
+        &mut |message| monitor.borrow_mut().message(message),
+        |sample| {
+            let mut monitor = monitor.borrow_mut();
+            monitor.sample(sample);
+            if let Ok(contact) = estimator.observe(sample) {
+                monitor.contact(contact);
+            }
+        },
+    )?;
+    let findings = monitor.into_inner().findings(&scan, &FaceTree::new(&scan));
+    let sure = findings.iter().filter(|finding| finding.is_sure).count();
+    let diagnosis = Diagnosis { is_sound: sure == 0, findings };
+    print_report(arguments.json, &diagnosis, || {
+        let lines = diagnosis.findings.iter().map(ToString::to_string).collect::<Vec<_>>();
+        if lines.is_empty() { "nothing speaks against scan and recording".to_owned() } else { lines.join("\n") }
+    });
+    match diagnosis.findings.first() {
+        Some(first) if first.is_sure => Err(CliError::new(("input", 3), first, None)),
+        _ => Ok(replayed.losses),
+    }
+}
+
+impl DoctorArguments {
+    /// The scene with the flags over it.
+    fn scene(&self) -> Result<Scene, CliError> {
+        let mut scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+        require(self.tip_radius_mm.is_some() || self.scene.is_some() && scene.tip.is_some(), NO_RADIUS)?;
+        if let Some(radius_mm) = self.tip_radius_mm {
+            scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
+        }
+        if let Some(stiffness) = self.stiffness_n_per_mm {
+            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
+        }
+        scene.validate().map_err(CliError::usage)?;
+        Ok(scene)
+    }
+}
