@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::contour::{MeshDraft, contour};
-use super::error::{SimError, not_negative, positive};
+use super::error::{SimError, not_negative, positive, up_to};
 use super::field::Field;
 use super::path::looking_along;
 use super::random::{gauss, gauss_vector, uniform};
@@ -40,6 +40,13 @@ settings! {
         rounding: f64 = 0.8e-3, not_negative("the rounding", *rounding, "m");
         /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
         closes_holes_below: f64 = 11e-3, not_negative("the width of closed holes", *closes_holes_below, "m");
+        /// By which share all lengths are too large, from the middle of the part.
+        scale_error: f64 = 0.0, not_negative("the size of the scale error", scale_error.abs(), ""),
+            not_negative("what the scale error leaves", 1.0 + scale_error, "");
+        /// How many places are missing that the scanner could not see.
+        missing: usize = 0, up_to("the number of missing places", *missing as f64, "", 1e4, "10000 or less");
+        /// Radius of each, m.
+        missing_radius: f64 = 3e-3, not_negative("the radius of missing places", *missing_radius, "m");
         /// Translation of the rigid offset of the scan, m.
         rigid_shift: f64 = 0.2e-3, not_negative("the rigid shift", *rigid_shift, "m");
         /// And by which angle, rad.
@@ -109,6 +116,9 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners));
     soup.drop_crossings_mut()?;
     soup.tidy_mut();
+    for _ in 0..params.missing {
+        lose_place_mut(&mut soup, params.missing_radius, &mut rng);
+    }
     soup.drop_unused_mut();
     if soup.faces.is_empty() {
         // what to change
@@ -117,8 +127,16 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
         return Err(if is_coarse { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen });
     }
     let slip_v = slip(params, &mut rng);
-    soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * *p));
+    soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * (*p * (1.0 + params.scale_error))));
     Ok(TriMesh::new(soup.positions, soup.faces)?)
+}
+
+/// Takes away what is within `radius` (m) of one of the vertices.
+fn lose_place_mut(soup: &mut MeshDraft, radius: f64, rng: &mut Pcg64) {
+    let Some(&[corner, ..]) = soup.faces.get(uniform(rng, [0.0, soup.faces.len() as f64]) as usize) else { return };
+    let middle = soup.positions[corner as usize];
+    let is_far = |&v: &u32| (soup.positions[v as usize] - middle).norm() > radius;
+    soup.faces.retain(|face| face.iter().all(is_far));
 }
 
 /// Fills in for what is not a clean surface.

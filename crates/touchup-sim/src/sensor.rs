@@ -8,7 +8,8 @@ use rand_distr::{Distribution, Exp1};
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
-use super::error::{not_negative, require, up_to};
+use super::bending::TipBending;
+use super::error::{SimError, not_negative, require, up_to};
 use super::random::{Drift, gauss, gauss_vector, uniform};
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
@@ -42,8 +43,29 @@ settings! {
         torque_noise: f64 = 1e-3, up_to("the torque noise", *torque_noise, "N m", 1e3, "from zero to 1 kN m");
         /// Slowly drifting, per axis, N.
         force_bias: f64 = 0.05, up_to("the force bias", *force_bias, "N", 1e3, "from zero to 1 kN");
-        /// How much later the wrench's clock reads than the pose's, s.
+        /// What the sensor reads when nothing touches, in T, N; the drift of the bias is on top of it.
+        tare: Vector3<f64> = Vector3::zeros(),
+            up_to("the size of the tare", tare.norm(), "N", 1e3, "from zero to 1 kN");
+        /// Smallest difference between two readings of the force, per axis, N; zero: none.
+        force_step: f64 = 0.0, up_to("the step of the force", *force_step, "N", 1e3, "from zero to 1 kN");
+        /// Half the width of the sensor's play, per axis, N: a reading follows the force only once it differs by more.
+        force_play: f64 = 0.0, up_to("the play of the force", *force_play, "N", 1e3, "from zero to 1 kN");
+        /// Slow wander of the pose beside its noise, per axis, m.
+        pose_wander: f64 = 0.0, up_to("the wander of the pose", *pose_wander, "m", 1.0, "from zero to 1 m");
+        /// Poses in a second.
+        pose_rate: f64 = 500.0, check_rate("the rate of the poses", *pose_rate);
+        /// Wrenches in a second.
+        wrench_rate: f64 = 1000.0, check_rate("the rate of the wrenches", *wrench_rate);
+        /// How much later the wrench's clock reads than the pose's at the start, s.
         wrench_clock: f64 = 1.8e-3;
+        /// By which share the wrench's clock is faster than the pose's.
+        clock_rate: f64 = 0.0, up_to("the size of the clock's rate", clock_rate.abs(), "", 1e-2, "within 1 %");
+        /// Maps O to the frame of the recorded poses.
+        scan_to_space: Isometry3<f64> = Isometry3::identity(),
+            not_negative("the size of the part's place", scan_to_space.translation.vector.norm(), "m");
+        /// Origin of T from the origin of the recorded pose, in its axes, m.
+        tip_offset: Vector3<f64> = Vector3::zeros(),
+            up_to("the size of the tip's offset", tip_offset.norm(), "m", 10.0, "from zero to 10 m");
         /// Of the pose's stamps, s; those of the wrench have half of it.
         jitter: f64 = 0.1e-3, not_negative("the jitter", *jitter, "s");
         /// Share of messages that never arrive.
@@ -57,6 +79,10 @@ settings! {
         /// Stamp of the first moment on the pose's clock, ns.
         start_ns: i64 = 1_700_000_000_000_000_000;
     }
+}
+
+fn check_rate(name: &'static str, rate: f64) -> Result<(), SimError> {
+    require((1.0..=1e4).contains(&rate), name, rate, "1/s", "from 1 to 10000")
 }
 
 impl SensorParams {
@@ -80,10 +106,10 @@ impl SensorParams {
 
 /// Largest clock offset that makes sense, s.
 const LARGEST_CLOCK: f64 = 1.0;
-/// Time between two moments, s: the wrench's period.
+/// Time between two moments, s.
 pub(super) const TICK: f64 = 1e-3;
-/// Ticks between two poses.
-const POSE_EVERY: usize = 2;
+/// The same, ns.
+const TICK_NS: u64 = 1_000_000;
 /// Jitter is cut off at this share of the period, so that stamps keep their order.
 const JITTER_LIMIT: f64 = 0.45;
 /// Time on the wire: at least, and on average beyond that, s.
@@ -94,45 +120,69 @@ const LATE: [f64; 2] = [5e-3, 15e-3];
 const GAP: [f64; 2] = [5e-3, 60e-3];
 /// Period of the bias' drift, s.
 const DRIFT_PERIOD: f64 = 40.0;
+/// Period of the pose's wander, s.
+const WANDER_PERIOD: f64 = 8.0;
 
 pub(super) struct Sensor<'a> {
     params: &'a SensorParams,
-    stiffness: f64,
+    tip: TipBending,
     bias: [Drift; 3],
+    wander: [Drift; 3],
+    /// Force within its play, N, in T.
+    played: Vector3<f64>,
     rng: Pcg64,
 }
 
 /// Which messages of one topic arrive, and when.
+#[derive(Clone, Copy)]
 struct Wire {
     period: f64,
     jitter: f64,
     clock: f64,
+    clock_rate: f64,
     silent_until: f64,
 }
 
 impl<'a> Sensor<'a> {
-    pub(super) fn new(params: &'a SensorParams, stiffness: f64, seed: u64) -> Self {
+    pub(super) fn new(params: &'a SensorParams, tip: TipBending, seed: u64) -> Self {
         // a stream of its own, so that the hand moves the same whatever the sensors do
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x5e75_0412_93ab_77c1);
         let bias = [(); 3].map(|()| Drift::new(DRIFT_PERIOD, &mut rng));
-        Self { params, stiffness, bias, rng }
+        let mut own = Pcg64::seed_from_u64(seed ^ 0x77a9_de11_4c20_5b3d);
+        let wander = [(); 3].map(|()| Drift::new(WANDER_PERIOD, &mut own));
+        Self { params, tip, bias, wander, played: Vector3::zeros(), rng }
     }
 
     /// All messages, in order of arrival.
     pub(super) fn record(mut self, moments: &[Moment]) -> Vec<Message> {
         let p = self.params;
-        let mut poses = Wire { period: TICK * POSE_EVERY as f64, jitter: p.jitter, clock: 0.0, silent_until: f64::MIN };
-        let mut wrenches = Wire { period: TICK, jitter: p.jitter / 2.0, clock: p.wrench_clock, silent_until: f64::MIN };
+        let silent = Wire { period: 0.0, jitter: 0.0, clock: 0.0, clock_rate: 0.0, silent_until: f64::MIN };
+        let mut poses = Wire { period: p.pose_rate.recip(), jitter: p.jitter, ..silent };
+        let mut wrenches = Wire {
+            period: p.wrench_rate.recip(),
+            jitter: p.jitter / 2.0,
+            clock: p.wrench_clock,
+            clock_rate: p.clock_rate,
+            ..silent
+        };
         let mut arrivals: Vec<(f64, Message)> = Vec::with_capacity(moments.len() * 2);
-        for (tick, moment) in moments.iter().enumerate() {
-            if tick % POSE_EVERY == 0 {
-                let pose_ot = self.pose(moment);
+        let (mut pose_count, mut wrench_count) = (0, 0);
+        loop {
+            let [pose_ns, wrench_ns] =
+                [(pose_count, p.pose_rate), (wrench_count, p.wrench_rate)].map(|(n, rate)| nanoseconds(n, rate));
+            let Some(moment) = moment_at(moments, pose_ns.min(wrench_ns)) else { break };
+            if pose_ns <= wrench_ns {
+                pose_count += 1;
+                let pose = self.pose(&moment);
                 let sent = self.send(&mut poses, moment.t);
-                arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Pose(StampedPose { stamp_ns, pose_ot }))));
+                arrivals
+                    .extend(sent.map(|(at, stamp_ns)| (at, Message::Pose(StampedPose { stamp_ns, pose_ot: pose }))));
+            } else {
+                wrench_count += 1;
+                let wrench = self.wrench(&moment);
+                let sent = self.send(&mut wrenches, moment.t);
+                arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Wrench(StampedWrench { stamp_ns, wrench }))));
             }
-            let wrench = self.wrench(moment);
-            let sent = self.send(&mut wrenches, moment.t);
-            arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Wrench(StampedWrench { stamp_ns, wrench }))));
         }
         arrivals.sort_by(|a, b| a.0.total_cmp(&b.0));
         arrivals.into_iter().map(|(_, message)| message).collect()
@@ -142,19 +192,28 @@ impl<'a> Sensor<'a> {
         gauss_vector(&mut self.rng) * rms
     }
 
-    /// The pose as reported: of a stylus that does not bend.
+    /// The pose as reported: of a stylus that does not bend, in the frame of the recorded poses.
     fn pose(&mut self, moment: &Moment) -> Isometry3<f64> {
-        let bent = moment.pose_ot.translation.vector - moment.force_o / self.stiffness;
-        let turn = UnitQuaternion::from_scaled_axis(self.shake(self.params.orientation_noise));
-        let centre = bent + self.shake(self.params.pose_noise);
-        Isometry3::from_parts(centre.into(), moment.pose_ot.rotation * turn)
+        let p = self.params;
+        let bend = self.tip.bend(&moment.pose_ot.rotation, &moment.force_o);
+        let bent = moment.pose_ot.translation.vector - bend;
+        let turn = UnitQuaternion::from_scaled_axis(self.shake(p.orientation_noise));
+        let wander = Vector3::from_fn(|i, _| self.wander[i].at(moment.t)) * p.pose_wander;
+        let shake = self.shake(p.pose_noise) + wander;
+        let pose_wt = p.scan_to_space * Isometry3::from_parts(bent.into(), moment.pose_ot.rotation);
+        let origin = pose_wt.translation.vector - pose_wt.rotation * p.tip_offset;
+        Isometry3::from_parts((origin + shake).into(), pose_wt.rotation * turn)
     }
 
     /// The wrench as reported: in T, about the ball's centre, through which every contact force goes.
     fn wrench(&mut self, moment: &Moment) -> Wrench {
-        let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * self.params.force_bias;
-        let force = moment.pose_ot.rotation.inverse() * moment.force_o + bias + self.shake(self.params.force_noise);
-        Wrench { force, torque: self.shake(self.params.torque_noise) }
+        let p = self.params;
+        let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * p.force_bias + p.tare;
+        let felt = moment.pose_ot.rotation.inverse() * moment.force_o;
+        self.played = felt.zip_map(&self.played, |f, last| last.clamp(f - p.force_play, f + p.force_play));
+        let force = self.played + bias + self.shake(p.force_noise);
+        let read = |f: f64| if p.force_step > 0.0 { (f / p.force_step).round() * p.force_step } else { f };
+        Wrench { force: force.map(read), torque: self.shake(p.torque_noise) }
     }
 
     /// When a message arrives (s) and what its stamp says (ns); `None` when it is lost.
@@ -174,7 +233,28 @@ impl<'a> Sensor<'a> {
         // an ideal wire keeps the order
         let ideal = p.late == 0.0;
         let delay = LATENCY[0] + if ideal { 0.0 } else { LATENCY[1] * wait } + if late < p.late { extra } else { 0.0 };
-        let seconds = t + wire.clock + jitter;
+        let seconds = t * (1.0 + wire.clock_rate) + wire.clock + jitter;
         Some((t + delay, p.start_ns + (seconds * 1e9).round() as i64))
     }
+}
+
+/// Time of the reading of this number, ns.
+fn nanoseconds(count: u64, rate: f64) -> u64 {
+    (count as f64 * 1e9 / rate).round() as u64
+}
+
+/// What was at a time after the start: between two moments all but the contacts is interpolated. `None` past the last.
+fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
+    let before = moments.get((at_ns / TICK_NS) as usize)?;
+    let share = (at_ns % TICK_NS) as f64 / TICK_NS as f64;
+    if share == 0.0 {
+        return Some(before.clone());
+    }
+    let after = moments.get((at_ns / TICK_NS) as usize + 1)?;
+    let pose_ot = Isometry3::from_parts(
+        before.pose_ot.translation.vector.lerp(&after.pose_ot.translation.vector, share).into(),
+        before.pose_ot.rotation.nlerp(&after.pose_ot.rotation, share),
+    );
+    let force_o = before.force_o.lerp(&after.force_o, share);
+    Some(Moment { t: before.t + share * TICK, pose_ot, force_o, contacts: before.contacts.clone() })
 }

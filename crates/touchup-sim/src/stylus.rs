@@ -3,16 +3,18 @@
 //! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it is blocked and climbs
 //! out of what it fell into. The tip does not enter the part ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives
 //! its size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported pose is that of a
-//! rigid stylus, so a tip of stiffness k makes it read centre − F/k.
+//! rigid stylus, so a tip of compliance C makes it read centre − C F
+//! ([`TipBending`]).
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
+use super::bending::TipBending;
 use super::error::{SimError, not_negative, positive, up_to};
 use super::path::Stroke;
-use super::random::Drift;
+use super::random::{Drift, SmoothField};
 use super::sensor::{Moment, Sensor, SensorParams, TICK};
 use super::surface::Surface;
 use super::tip::SimTip;
@@ -32,8 +34,19 @@ settings! {
         shape: TipShape = TipShape::Ball;
         /// Stiffness of the tip, N/m.
         stiffness: f64 = 20e3, positive("the tip's stiffness", *stiffness, "N/m");
+        /// Stiffness along each of three perpendicular directions over `stiffness`.
+        stiffness_shares: Vector3<f64> = Vector3::repeat(1.0),
+            positive("the smallest share of the tip's stiffness", stiffness_shares.min(), ""),
+            up_to("the largest share of the tip's stiffness", stiffness_shares.max(), "", 1e3, "from zero to 1000");
+        /// Turns these directions to the axes of T.
+        stiffness_axes: UnitQuaternion<f64> = UnitQuaternion::identity();
         /// Coefficient of friction.
         friction: f64 = 0.15, up_to("the friction", *friction, "", 10.0, "from zero to ten");
+        /// How much it varies over the part, root mean square over the mean.
+        friction_variation: f64 = 0.0,
+            up_to("the variation of friction", *friction_variation, "", 1.0, "from zero to one");
+        /// Over which distance it stays alike, m.
+        friction_length: f64 = 10e-3, positive("the length of the friction's variation", *friction_length, "m");
         /// How hard the hand presses on average, N.
         force: f64 = 2.5, up_to("the hand's force", *force, "N", LARGEST_FORCE, "from zero to 1 kN");
         /// How much that varies, root mean square, N.
@@ -54,6 +67,13 @@ fn check_range([least, most]: [f64; 2], stiffness: f64) -> Result<(), SimError> 
     up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
     up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
     up_to("the bending of the tip", most / stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")
+}
+
+impl StylusParams {
+    /// How the tip bends.
+    pub fn bending(&self) -> TipBending {
+        TipBending { stiffness: self.stiffness, shares: self.stiffness_shares, axes: self.stiffness_axes }
+    }
 }
 
 /// A simulated recording with the truth behind it.
@@ -113,6 +133,7 @@ struct Leading<'a> {
     hand: Hand,
     upright: UnitQuaternion<f64>,
     tip: SimTip,
+    friction: SmoothField,
     centre: Point3<f64>,
     climbing: bool,
     firmness: f64,
@@ -140,6 +161,7 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
         hand: Hand::new(seed),
         upright,
         tip: SimTip::new(params.shape, params.radius, surface, start, upright)?,
+        friction: SmoothField::new(params.friction_length, &mut Pcg64::seed_from_u64(seed ^ 0x4b1d_f00d_29c4_e653)),
         centre: *start,
         climbing: false,
         firmness: 0.0,
@@ -147,7 +169,7 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
     };
     path.iter().for_each(|stroke| leading.follow(stroke));
     let moments = leading.moments;
-    let messages = Sensor::new(&params.sensor, params.stiffness, seed).record(&moments);
+    let messages = Sensor::new(&params.sensor, params.bending(), seed).record(&moments);
     Ok(Touch { messages, moments })
 }
 
@@ -208,9 +230,11 @@ impl Leading<'_> {
         self.firmness += (goal - self.firmness) * (TICK / FIRM);
         let wanted = (p.force + p.force_variation * self.hand.force.at(t)).clamp(p.force_range[0], p.force_range[1]);
         let total: f64 = contacts.iter().map(|c| c.held_back).sum();
+        let varied = |c: &BallContact| (1.0 + p.friction_variation * self.friction.at(&c.point)).max(0.0);
+        let friction = |c: &BallContact| if p.friction_variation > 0.0 { p.friction * varied(c) } else { p.friction };
         let force = |c: &BallContact| {
             let along = sliding - c.normal * sliding.dot(&c.normal);
-            let drag = along * (p.friction / (along.norm() + CREEP));
+            let drag = along * (friction(c) / (along.norm() + CREEP));
             (c.normal - drag) * (c.held_back / total)
         };
         let force_o = contacts.iter().map(force).sum::<Vector3<f64>>() * (wanted * self.firmness);

@@ -4,6 +4,7 @@ mod arm;
 mod scanner;
 mod stylus;
 mod surface;
+mod world;
 
 use std::f64::consts::PI;
 
