@@ -32,6 +32,7 @@ mod replay;
 mod report;
 mod signals;
 mod simulate;
+mod simulated_world;
 mod step;
 mod threads;
 #[cfg(feature = "ur")]

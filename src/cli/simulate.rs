@@ -8,14 +8,15 @@ use clap::Args;
 use tracing::warn;
 
 use super::progress::WorkProgress;
+use super::simulated_world::{OffFactor, world_named, write_told_scene, write_truth};
 use super::{CliError, Losses, check_kept, not_written, print_result, require};
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::sim::{
-    CameraParams, MeshSurface, PathParams, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_mesh, scan,
-    see_markers, touch,
+    CameraParams, DrawnWorld, Habit, MeshSurface, PathParams, ScannerParams, SimWorld, Stroke, StylusParams, Surface,
+    Touch, plan_mesh, scan, see_markers, touch,
 };
 use crate::stylus::{MarkerFrame, Message};
 
@@ -44,21 +45,29 @@ pub(super) struct SimulateArguments {
     /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Radius of the ball, mm
-    #[arg(long, value_name = "R", default_value_t = 1.5, allow_negative_numbers = true)]
-    tip_radius_mm: f64,
-    /// Stiffness of stylus and holder at the ball, N/mm
-    #[arg(long, value_name = "K", default_value_t = 20.0, allow_negative_numbers = true)]
-    stiffness_n_per_mm: f64,
-    /// Coefficient of friction between ball and part
-    #[arg(long, value_name = "MU", default_value_t = 0.15, allow_negative_numbers = true)]
-    friction: f64,
-    /// Median edge of the scan's triangles, mm
-    #[arg(long, value_name = "E", default_value_t = 2.4, allow_negative_numbers = true)]
-    scan_edge_mm: f64,
-    /// Noise of the scan along its normals, mm
-    #[arg(long, value_name = "S", default_value_t = 0.6, allow_negative_numbers = true)]
-    scan_noise_mm: f64,
+    /// Draws the truth of all that is not named from the ranges of a world, and writes what a calibration tells of it as scene.yaml (for
+    /// refine --scene) and each true value as truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
+    #[arg(long, value_name = "NAME", value_parser = world_named, conflicts_with = "markers")]
+    world: Option<SimWorld>,
+    /// By which factor the errors of what is told are larger than the scene says: 3 for all, radius=3 for one (radius, stiffness,
+    /// tip-offset, registration, clock, tare); may be given again
+    #[arg(long, value_name = "FACTOR", requires = "world")]
+    told_off: Vec<OffFactor>,
+    /// True radius of the ball, mm [default: 1.5, or as the world draws it]
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    tip_radius_mm: Option<f64>,
+    /// True stiffness of stylus and holder at the ball, N/mm [default: 20, or as the world draws it]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    stiffness_n_per_mm: Option<f64>,
+    /// Coefficient of friction between ball and part [default: 0.15, or as the world draws it]
+    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
+    friction: Option<f64>,
+    /// Median edge of the scan's triangles, mm [default: 2.4, or as the world draws it]
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    scan_edge_mm: Option<f64>,
+    /// Noise of the scan along its normals, mm [default: 0.6, or as the world draws it]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    scan_noise_mm: Option<f64>,
     /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic /stylus/markers
     #[arg(long)]
     markers: bool,
@@ -66,36 +75,48 @@ pub(super) struct SimulateArguments {
 
 /// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
-    let (given, smallest, largest) = (arguments.tip_radius_mm, TIP_RADII_MM.start(), TIP_RADII_MM.end());
-    let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
-    require(TIP_RADII_MM.contains(&given), why)?;
+    if let Some(given) = arguments.tip_radius_mm {
+        let (smallest, largest) = (TIP_RADII_MM.start(), TIP_RADII_MM.end());
+        let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
+        require(TIP_RADII_MM.contains(&given), why)?;
+    }
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
     let MeshFile { mesh: truth, repair } = read_mesh(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
         warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
     }
     let surface = MeshSurface::new(&truth)?;
-    let scanner = ScannerParams {
-        edge: arguments.scan_edge_mm / 1e3,
-        noise: arguments.scan_noise_mm / 1e3,
-        seed: arguments.seed,
-        ..ScannerParams::default()
-    };
-    let radius = arguments.tip_radius_mm / 1e3;
-    let stylus = StylusParams {
-        radius,
-        stiffness: arguments.stiffness_n_per_mm * 1e3,
-        friction: arguments.friction,
-        ..StylusParams::default()
-    };
+    let off = OffFactor::joined(&arguments.told_off)?;
+    let mut drawn = arguments.world.map(|world| world.draw_told_off(arguments.seed, &off)).transpose()?;
+    let usual = || (ScannerParams { seed: arguments.seed, ..ScannerParams::default() }, StylusParams::default());
+    let (mut scanner, mut stylus) = drawn.as_ref().map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
+    for (given, unit, name, place) in [
+        (arguments.tip_radius_mm, 1e-3, "tip_radius", &mut stylus.radius),
+        (arguments.stiffness_n_per_mm, 1e3, "stiffness", &mut stylus.stiffness),
+        (arguments.friction, 1.0, "friction", &mut stylus.friction),
+        (arguments.scan_edge_mm, 1e-3, "scan_edge", &mut scanner.edge),
+        (arguments.scan_noise_mm, 1e-3, "scan_noise", &mut scanner.noise),
+    ] {
+        let Some(given) = given else { continue };
+        *place = given * unit;
+        if let Some(drawn) = &mut drawn {
+            drawn.set_truth(name, given * unit);
+        }
+    }
     let camera = arguments.markers.then(CameraParams::default);
-    let hand = PathParams { radius, ..PathParams::default() };
+    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
     let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
+    let path = drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit).led(path);
     let out = &arguments.out;
     let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &stylus, camera.as_ref(), out)?;
+    if let Some(drawn) = &drawn {
+        write_told_scene(drawn, DrawnWorld::lever(&surface), &out.join("scene.yaml"))?;
+        write_truth(drawn, &out.join("truth.json"))?;
+    }
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
+    let of_world = drawn.as_ref().map_or_else(String::new, |drawn| format!("world: {}\n", drawn.world.name()));
     print_result(&format!(
-        "scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
+        "{of_world}scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
         scan.face_count(),
         touch.messages.len(),
         out.display()
