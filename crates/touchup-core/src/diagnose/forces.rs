@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::monitor::InputRecord;
+use super::input_record::InputRecord;
 use crate::numeric::quantile;
 
 /// Samples that are tried as the rest.

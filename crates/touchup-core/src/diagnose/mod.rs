@@ -6,6 +6,7 @@
 
 mod finding;
 mod forces;
+mod input_record;
 mod monitor;
 mod places;
 mod stamps;

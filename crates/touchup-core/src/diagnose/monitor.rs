@@ -4,6 +4,7 @@ use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, signed_permutations};
+use super::input_record::InputRecord;
 use super::places::{BallFit, ScanScale, extent_of, place_mistakes};
 use super::stamps::InputStamps;
 use crate::mesh::{FaceTree, TriMesh};
@@ -61,20 +62,6 @@ pub struct InputMonitorParams {
     pub contact_on: Option<f64>,
     /// of the pairing
     pub sync: SyncParams,
-}
-
-/// One sample that is kept.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct InputRecord {
-    pub centre: Point3<f64>,
-    pub rotation: UnitQuaternion<f64>,
-    pub force_o: Vector3<f64>,
-}
-
-impl InputRecord {
-    pub fn force_t(&self) -> Vector3<f64> {
-        self.rotation.inverse_transform_vector(&self.force_o)
-    }
 }
 
 /// Doubts the input while it is replayed or measured. Memory is bounded, and a sample costs a rotation.

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{CarveParams, Case, MOST_LOOKED_AT, Refiner, RegionFit, Update};
 use crate::mesh::{FaceHit, FaceId, triangle};
+use crate::numeric::length_and_direction;
 use crate::stylus::{Ball, TipBody, TipPlace};
 
 /// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
@@ -111,13 +112,13 @@ impl Refiner {
     fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Inside> {
         let normal = self.deformable.mesh.normal(hit.face);
         let arm = centre - hit.point;
-        let distance = arm.norm();
+        let (distance, along) = length_and_direction(&arm);
         let height = arm.dot(&normal);
         if normal == Vector3::zeros() {
             return None;
         }
         // beside a rim the arm hardly separates inside from outside
-        let away = if height.abs() <= SIDEWAYS * distance { normal } else { arm * (height.signum() / distance) };
+        let away = if height.abs() <= SIDEWAYS * distance { normal } else { along * height.signum() };
         let depth = self.params.tip.radius - distance.copysign(height);
         Some(Inside { out: -away, depth, barycentric: hit.barycentric })
     }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId, triangle};
+use crate::numeric::{direction, length_and_direction};
 
 type TrianglePoints = [Point3<f64>; 3];
 
@@ -141,7 +142,7 @@ fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: 
 
 /// How far all of `u` lies on one side of the plane of `t`, m; negative when it does not.
 fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
-    let Some(normal) = (t[1] - t[0]).cross(&(t[2] - t[0])).try_normalize(0.0) else { return f64::NEG_INFINITY };
+    let Some(normal) = direction(&(t[1] - t[0]).cross(&(t[2] - t[0]))) else { return f64::NEG_INFINITY };
     let heights = u.map(|p| normal.dot(&(p - t[0])));
     let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &h| (a.min(h), b.max(h)));
     low.max(-high)
@@ -154,17 +155,20 @@ fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
 /// m, and |Δn| ≤ 3 m / altitude while m is small.
 fn margin_at_corner(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
     let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
-    let area = double.norm();
+    let (area, normal) = length_and_direction(&double);
     if area == 0.0 {
         return 0.0;
     }
     let altitude = (triangle::shape_quality(t, area) * area).sqrt();
     let arms = [u[(j + 1) % 3] - t[i], u[(j + 2) % 3] - t[i]];
-    let [a, b] = arms.map(|arm| double.dot(&arm) / area);
+    let [a, b] = arms.map(|arm| normal.dot(&arm));
     if a * b <= 0.0 {
         return 0.0;
     }
     let reach = arms[0].norm().max(arms[1].norm());
+    if altitude == 0.0 {
+        return 0.0;
+    }
     (a.abs().min(b.abs()) / (2.0 + 4.0 * reach / altitude)).min(SMALL_TURN * altitude)
 }
 

@@ -7,7 +7,7 @@ use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
 use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
 use super::stroke_undo::StrokeUndo;
-use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId};
+use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId, is_place};
 use crate::reconstruct::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
@@ -308,7 +308,8 @@ impl DeformableMesh {
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
             let (moved, next) = (here - scanned, here + step - scanned);
             let is_far = next.norm_squared() > self.largest_move * self.largest_move && next.norm() > moved.norm();
-            if is_stiff || is_far {
+            // the last look at what all formulas before came to: a vertex never goes where there is no place
+            if is_stiff || is_far || !is_place(&(here + step)) {
                 step = Vector3::zeros();
             }
             longest = longest.max(step.norm_squared());

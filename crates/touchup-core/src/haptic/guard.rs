@@ -8,6 +8,7 @@ use super::collision::{Corners, Pairs, bounds};
 use super::ring::Ring;
 use super::scratch_map::ScratchMap;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
+use crate::numeric::{direction, length_and_direction};
 use crate::parameters;
 
 parameters! {
@@ -127,9 +128,8 @@ pub(super) struct Neighbourhood {
 fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
     let corners = mesh.triangle(face);
     let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-    let double_area = double.norm();
+    let (double_area, normal) = length_and_direction(&double);
     let quality = triangle::shape_quality(&corners, double_area);
-    let normal = if double_area > 0.0 { double / double_area } else { Vector3::zeros() };
     // 2A / L from 2A / L² and 2A
     FaceShape { normal, quality, altitude: (quality * double_area).sqrt() }
 }
@@ -200,7 +200,7 @@ impl Neighbourhood {
     /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
         let sum: Vector3<f64> = self.before[..self.ring.moving].iter().map(|shape| shape.normal).sum();
-        let mean = sum.try_normalize(0.0)?;
+        let mean = direction(&sum)?;
         if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
             return None;
         }

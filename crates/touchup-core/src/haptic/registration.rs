@@ -13,7 +13,8 @@ use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::mean;
 use crate::numeric::{
-    NormalEquations, VoxelKey, cauchy_weight, moved_by_twist, point_to_plane_row, voxel_neighbourhood, voxel_of,
+    NormalEquations, VoxelKey, cauchy_weight, direction, moved_by_twist, point_to_plane_row, voxel_neighbourhood,
+    voxel_of,
 };
 use crate::stylus::SettingError;
 
@@ -183,7 +184,7 @@ impl Registrar {
 }
 
 fn contact_of(mean: &Mean) -> Option<(Point3<f64>, Vector3<f64>)> {
-    Some((Point3::from(mean.point / mean.count), mean.normal.try_normalize(0.0)?))
+    Some((Point3::from(mean.point / mean.count), direction(&mean.normal)?))
 }
 
 /// One round of least squares.

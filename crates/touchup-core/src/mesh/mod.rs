@@ -20,6 +20,6 @@ pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub(crate) use signed_distance::corner_normal;
 pub use signed_distance::{pseudo_normal, signed_distance};
-pub use tri_mesh::{MeshError, TriMesh};
+pub use tri_mesh::{FARTHEST, MeshError, TriMesh, is_place};
 pub(crate) use workers::map_by;
 pub use workers::{Alone, Job, Workers};

@@ -5,9 +5,12 @@ use nalgebra::{Point3, Vector3};
 use super::journal::{Changes, Journal};
 use super::stars::{MOST_FACES, Stars, Valences};
 use super::{FaceId, VertexId};
+use crate::numeric::direction;
 
 /// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;
+/// A coordinate beyond it is a fault and not a place, m: products of six such lengths are still far from overflow.
+pub const FARTHEST: f64 = 1e9;
 /// Vertices that ids can name.
 const MOST_VERTICES: usize = REMOVED as usize - 1;
 
@@ -49,8 +52,8 @@ pub enum MeshError {
         /// the index found twice
         vertex: u32,
     },
-    /// NaN or infinite coordinate.
-    #[error("vertex {vertex} has a coordinate that is not finite")]
+    /// NaN or infinite coordinate, or one that no place has.
+    #[error("vertex {vertex} has a coordinate that is not a number within {FARTHEST:e} m")]
     NotFinite {
         /// which vertex, counted from 0
         vertex: usize,
@@ -69,7 +72,7 @@ pub enum MeshError {
 ///
 /// `positions`: V × 3, m, in O; `faces`: F × 3, counter-clockwise seen from outside.
 ///
-/// Invariants: every position is finite; every index is in range; no face uses a vertex twice. Faces may have any
+/// Invariants: every coordinate is within [`FARTHEST`]; every index is in range; no face uses a vertex twice. Faces may have any
 /// shape, edges may be shared by any number of faces (scans are like that): what a scan lacks is in
 /// [`crate::mesh::RepairReport`], not refused here.
 #[derive(Clone, Debug)]
@@ -94,7 +97,7 @@ impl TriMesh {
                 return Err(MeshError::TooMany { what, count });
             }
         }
-        if let Some(vertex) = positions.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
+        if let Some(vertex) = positions.iter().position(|p| !is_place(p)) {
             return Err(MeshError::NotFinite { vertex });
         }
         for (face, corners) in faces.iter().enumerate() {
@@ -210,7 +213,7 @@ impl TriMesh {
     /// Outward unit normal of a face; zero when the face has no area.
     #[inline]
     pub fn normal(&self, face: FaceId) -> Vector3<f64> {
-        self.double_area_normal(face).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+        direction(&self.double_area_normal(face)).unwrap_or_else(Vector3::zeros)
     }
 
     /// Barycentre of a face, m, in O.
@@ -231,10 +234,16 @@ impl TriMesh {
         self.star(a).iter().copied().filter(move |&f| self.corners(f).contains(&b))
     }
 
+    /// Whether no edge is that of one face alone. O(F).
+    pub fn is_closed(&self) -> bool {
+        let is_rim = |a, b| self.faces_at_edge(a, b).nth(1).is_none();
+        self.faces().all(|(_, [a, b, c])| !is_rim(a, b) && !is_rim(b, c) && !is_rim(c, a))
+    }
+
     /// Moves one vertex; an index over the faces must be refitted ([`crate::mesh::FaceTree::refit`]).
     #[inline]
     pub fn set_position(&mut self, vertex: VertexId, position: Point3<f64>) {
-        debug_assert!(position.coords.iter().all(|x| x.is_finite()));
+        debug_assert!(is_place(&position));
         self.positions[vertex.0 as usize] = position;
         self.note_vertex(vertex.0);
     }
@@ -297,7 +306,7 @@ impl TriMesh {
     pub fn add_vertex(&mut self, position: Point3<f64>) -> Result<VertexId, MeshError> {
         let next = self.positions.len();
         let vertex = self.free_vertices.last().map_or(next, |vertex| vertex.0 as usize);
-        if !position.coords.iter().all(|x| x.is_finite()) {
+        if !is_place(&position) {
             return Err(MeshError::NotFinite { vertex });
         }
         if vertex >= MOST_VERTICES {
@@ -368,6 +377,12 @@ impl TriMesh {
         self.faces[face.0 as usize].swap(1, 2);
         self.note_face(face);
     }
+}
+
+/// Whether all coordinates are within [`FARTHEST`]; not of NaN.
+#[inline]
+pub fn is_place(p: &Point3<f64>) -> bool {
+    p.coords.iter().all(|x| x.abs() <= FARTHEST)
 }
 
 fn check_corners(corners: &[u32; 3], face: usize, vertices: usize) -> Result<(), MeshError> {

@@ -2,9 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::numeric::{direction, length_and_direction};
+
 /// Twice the area over the longest edge squared, itself squared, below which the foot inside a triangle is found by
 /// another formula: the quotient of areas loses ε/0.01 of the edge there, and everything where there is no area.
 const THIN: f64 = 0.01;
+/// A product of four lengths, m⁴, below which its parts have lost digits or are gone: edges of some 1e-73 m.
+const SMALLEST_PRODUCT: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
 ///
@@ -45,7 +49,7 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
     let area = va + vb + vc;
     // the squared edges are differences of what is there
     let longest = (d1 - d3).max(d2 - d6).max((d4 - d3) + (d5 - d6));
-    if area < THIN * longest * longest {
+    if area < (THIN * longest * longest).max(SMALLEST_PRODUCT) {
         return closest_point_of_thin(p, [a, b, c]);
     }
     let scale = 1.0 / area;
@@ -73,9 +77,10 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
         take(s + side * t, barycentric);
     }
     let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-    if let Some(normal) = double.try_normalize(0.0) {
+    let (double_area, normal) = length_and_direction(&double);
+    if double_area > 0.0 {
         let foot = p - normal * normal.dot(&(p - corners[0]));
-        let share = |s: &Point3<f64>, e: &Point3<f64>| normal.dot(&(s - foot).cross(&(e - foot))) / double.norm();
+        let share = |s: &Point3<f64>, e: &Point3<f64>| normal.dot(&(s - foot).cross(&(e - foot))) / double_area;
         let (u, v) = (share(corners[1], corners[2]), share(corners[2], corners[0]));
         if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
             take(foot, [u, v, 1.0 - u - v]);
@@ -90,11 +95,7 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
 #[inline]
 pub fn segment_crosses(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], gap: f64) -> bool {
     let normal = (b - a).cross(&(c - a));
-    let length = normal.norm();
-    if length == 0.0 {
-        return false;
-    }
-    let unit = normal / length;
+    let Some(unit) = direction(&normal) else { return false };
     let (hp, hq) = (unit.dot(&(p - a)), unit.dot(&(q - a)));
     if hp.min(hq) > gap || hp.max(hq) < -gap {
         return false;

@@ -3,6 +3,7 @@
 
 mod basis;
 mod counted;
+mod direction;
 mod least_squares;
 mod moments;
 mod point_grid;
@@ -15,6 +16,7 @@ mod voxel;
 pub(crate) use basis::tangent_basis;
 pub use basis::turned_to;
 pub use counted::counted;
+pub(crate) use direction::{direction, length_and_direction};
 pub(crate) use least_squares::{DampedSearch, NormalEquations, SearchEnd};
 pub(crate) use moments::{centroid_and_spread, mean, scatter, spreads};
 pub(crate) use point_grid::PointGrid;

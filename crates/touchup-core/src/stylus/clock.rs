@@ -12,7 +12,7 @@ use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use super::{ContactSample, SettingError};
-use crate::numeric::{NormalEquations, median};
+use crate::numeric::{NormalEquations, direction, median};
 
 /// What the clock of the wrench reads beyond that of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -199,7 +199,7 @@ impl ClockEstimator {
         let around = self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&(x.stamp_ns - onset_ns)));
         let of_press = |x: &&OnsetEntry| (0.0..=AFTER).contains(&((x.stamp_ns - onset_ns) as f64 * 1e-9));
         let pressed: Vector3<f64> = around.clone().filter(of_press).map(|x| x.force_o).sum();
-        let along = pressed.try_normalize(0.0)?;
+        let along = direction(&pressed)?;
         let of_entry = |x: &OnsetEntry| {
             let t = (x.stamp_ns - onset_ns) as f64 * 1e-9;
             OnsetSample { t, centre: x.position.dot(&along), force: x.force_o.dot(&along) }

@@ -11,6 +11,8 @@
 
 use nalgebra::Vector3;
 
+use crate::numeric::direction;
+
 /// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
 /// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
 pub const WIDEST_CONE_COSINE: f64 = 0.9135;
@@ -40,7 +42,7 @@ impl NormalEstimate {
     ///
     /// - `force_o`: force of the object on the stylus, N, in O.
     pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
-        force_o.try_normalize(0.0).map(|normal| Self { normal, sigma: LEAST_SIGMA })
+        direction(force_o).map(|normal| Self { normal, sigma: LEAST_SIGMA })
     }
 }
 
@@ -181,7 +183,7 @@ impl Friction {
 
     /// The normal under the ball; `None` without a force.
     pub fn normal(&self, sliding: &Sliding) -> Option<NormalEstimate> {
-        let along_force = sliding.force_o.try_normalize(0.0)?;
+        let along_force = direction(&sliding.force_o)?;
         let [usual, usual_sigma] = self.angle;
         let (speed, noise) = (sliding.velocity.norm(), sliding.velocity_sigma);
         let across_force = sliding.velocity - along_force * sliding.velocity.dot(&along_force);

@@ -20,7 +20,7 @@ pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
 use soup::Soup;
-use touchup_core::mesh::{MeshError, RepairReport, TriMesh, repair};
+use touchup_core::mesh::{FARTHEST, MeshError, RepairReport, TriMesh, is_place, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Why a mesh file could not be read or written.
@@ -60,6 +60,14 @@ pub enum MeshFileError {
         path: PathBuf,
         /// why
         source: MeshError,
+    },
+    /// A mesh with a vertex that is nowhere is not written.
+    #[error("{}: not written: vertex {vertex} has a coordinate that is not a number within {FARTHEST:e} m", path.display())]
+    NoPlace {
+        /// the file
+        path: PathBuf,
+        /// which vertex, counted from 0
+        vertex: u32,
     },
     /// The unit cannot be right.
     #[error("{}: {size}", path.display())]
@@ -188,7 +196,7 @@ pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
 /// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for bit.
 ///
 /// # Errors
-/// [`MeshFileError::UnknownFormat`], [`MeshFileError::File`].
+/// [`MeshFileError::UnknownFormat`], [`MeshFileError::NoPlace`], [`MeshFileError::File`].
 pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
     write_mesh_with(path, mesh, &[], unit)
 }
@@ -204,6 +212,9 @@ pub fn write_mesh_with(
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
     let format = Format::of_name(path)?;
+    if let Some(vertex) = mesh.positions().iter().position(|p| !is_place(p)) {
+        return Err(MeshFileError::NoPlace { path: path.into(), vertex: vertex as u32 });
+    }
     let ((soup, ids), unit) = (Soup::used_part(mesh, unit.metres()), unit.to_string());
     Ok(write_file(path, |out| match format {
         Format::Ply => ply::write(&soup, &ids, columns, &unit, out),

@@ -1,6 +1,7 @@
 //! The refiner from outside: what a push may do, what it must do, and what it must never do.
 
 mod adversary;
+mod extreme;
 mod paper;
 mod plate;
 mod refusal;

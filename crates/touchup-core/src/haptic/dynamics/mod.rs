@@ -23,6 +23,7 @@ mod sigmoid_flow;
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
+use crate::numeric::length_and_direction;
 use crate::{parameters, words};
 
 pub use contact_model::{ContactModel, LARGEST_SHARE};
@@ -37,8 +38,6 @@ pub const UNIT_TOLERANCE: f64 = 1e-6;
 pub const RELATIVE_ERROR: f64 = 1e-9;
 /// An impulse (times α) that turns a face by one is no larger, m: beyond it the face does not turn.
 const NO_TURNING: f64 = 1e100;
-/// Squares below it have lost digits.
-const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 /// Below it the weight of the end is 1/2 + z/12 to rounding.
 const SMALL_DECAY: f64 = 1e-5;
 
@@ -208,7 +207,7 @@ impl FaceDynamics {
         force: &Vector3<f64>,
         dt: f64,
     ) -> Result<FaceState, DynamicsError> {
-        let (magnitude, towards) = split(force);
+        let (magnitude, towards) = length_and_direction(force);
         let sum = face.b.coords + face.n + p.coords;
         if !(finite(&sum) && finite(force) && magnitude.is_finite() && dt.is_finite()) {
             return Err(not_finite(face, p, force));
@@ -380,23 +379,6 @@ fn end_weight(z: f64) -> f64 {
     }
     let decayed = -(-z).exp_m1();
     1.0 / decayed - 1.0 / z
-}
-
-/// |F| and F/|F|, also where |F|² would underflow or overflow; zero where F is.
-#[inline]
-fn split(force: &Vector3<f64>) -> (f64, Vector3<f64>) {
-    let squared = force.norm_squared();
-    if (SMALLEST_SQUARE..f64::MAX).contains(&squared) {
-        let magnitude = squared.sqrt();
-        return (magnitude, force / magnitude);
-    }
-    let largest = force.amax();
-    if largest == 0.0 {
-        return (0.0, Vector3::zeros());
-    }
-    let scaled = force / largest;
-    let length = scaled.norm();
-    (largest * length, scaled / length)
 }
 
 #[cold]

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::closest::greater;
 use super::stars::Valences;
-use super::tri_mesh::{MeshError, TriMesh};
+use super::tri_mesh::{FARTHEST, MeshError, TriMesh};
 use crate::numeric::counted;
 use orient::{Edges, boundary_loops};
 
@@ -25,7 +25,7 @@ const ZERO_AREA: f64 = 16.0 * f64::EPSILON;
 pub struct RepairReport {
     /// vertices merged into an earlier one at the same position
     pub welded_vertices: usize,
-    /// faces left out because a coordinate, or their area, is not a finite number
+    /// faces left out because a coordinate is not a number within [`FARTHEST`]
     pub dropped_not_finite: usize,
     /// faces left out because they name a vertex twice or have no area
     pub dropped_zero_area: usize,
@@ -133,11 +133,12 @@ fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut
         let double_area_2 = u.cross(&v).norm_squared();
         let longest_2 = greater(u.norm_squared(), greater(v.norm_squared(), (c - b).norm_squared()));
         let limit_2 = longest_2 * (ZERO_AREA * greater(largest(&a), greater(largest(&b), largest(&c)))).powi(2);
-        // false for NaN, which every coordinate that is not finite brings about
-        let stays = double_area_2 > limit_2 && double_area_2 < f64::INFINITY;
+        // false for NaN, which every coordinate that is not a number brings about
+        let is_near = greater(largest(&a), greater(largest(&b), largest(&c))) <= FARTHEST;
+        let stays = double_area_2 > limit_2 && is_near;
         if stays {
             valences.add(corners);
-        } else if double_area_2.is_finite() && limit_2.is_finite() {
+        } else if double_area_2.is_finite() && is_near {
             report.dropped_zero_area += 1;
         } else {
             report.dropped_not_finite += 1;

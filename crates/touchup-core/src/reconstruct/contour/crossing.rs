@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::numeric::direction;
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
 use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
@@ -61,7 +62,7 @@ fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing
     let share = share_of(values);
     let slope = gradient(grid, &ends[0]) * (1.0 - share) + gradient(grid, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();
-    let normal = slope.try_normalize(0.0).unwrap_or_else(|| outward.normalize());
+    let normal = direction(&slope).unwrap_or_else(|| outward.normalize());
     Crossing { point: a + (b - a) * share, normal }
 }
 
@@ -153,7 +154,8 @@ mod tests {
         let tip = TipBody::new(TipShape::Ball, RADIUS).unwrap();
         let free_space = FreeSpace::new(tip, 0.1 * RADIUS, 2.0 * RADIUS);
         let (contacts, free_space) = (&contacts, &free_space);
-        let evidence = Evidence { params: &params, contacts, free_space, scan: &scan, tree: &tree, prior: None };
+        let evidence =
+            Evidence { params: &params, contacts, free_space, scan: &scan, tree: &tree, prior: None, is_closed: false };
         let mut scratch = FieldScratch::default();
         for (depth, share) in [(0.02e-3, 0.5), (0.05e-3, 0.7), (0.1e-3, 0.9), (0.3e-3, 0.2)] {
             let [a, b] = [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));

@@ -7,6 +7,7 @@
 use nalgebra::{Point3, Vector2, Vector3};
 
 use crate::mesh::triangle::shape_quality;
+use crate::numeric::direction;
 use crate::reconstruct::field::lattice::{Lattice, Square, across};
 
 /// How far inside the rim of a square a segment has to pass, as a share of the pitch.
@@ -135,7 +136,7 @@ fn better(c: &[Point3<f64>; 4]) -> usize {
         let triangles = [[c[i], c[i + 1], c[i + 2]], [c[i], c[i + 2], c[(i + 3) % 4]]];
         let normals = triangles.map(|t| (t[1] - t[0]).cross(&(t[2] - t[0])));
         let worse = [0, 1].map(|k| shape_quality(&triangles[k], normals[k].norm()));
-        let [m, n] = normals.map(|n| n.try_normalize(0.0).unwrap_or_else(Vector3::zeros));
+        let [m, n] = normals.map(|n| direction(&n).unwrap_or_else(Vector3::zeros));
         (m.dot(&n), worse[0].min(worse[1]))
     };
     let ((flat0, shape0), (flat1, shape1)) = (rate(0), rate(1));

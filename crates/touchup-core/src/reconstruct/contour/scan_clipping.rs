@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
-use crate::numeric::distinct;
+use crate::numeric::{direction, distinct};
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
 use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::triangulation::fill;
@@ -159,8 +159,8 @@ impl Cut {
         let loops = outline(&scratch.pieces, region);
         let Scratch { pieces, vertex_of, plane } = scratch;
         // seen along the normal
-        let across = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).try_normalize(0.0).unwrap_or_else(Vector3::x);
-        let up = normal.cross(&across).try_normalize(0.0).unwrap_or_else(Vector3::y);
+        let across = direction(&normal.cross(&Vector3::ith(normal.iamin(), 1.0))).unwrap_or_else(Vector3::x);
+        let up = direction(&normal.cross(&across)).unwrap_or_else(Vector3::y);
         let origin = pieces.position(0);
         plane.clear();
         plane.extend((0..pieces.point_count() as u32).map(|i| {

@@ -8,7 +8,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::numeric::{voxel_neighbourhood, voxel_of};
+use crate::numeric::{direction, voxel_neighbourhood, voxel_of};
 use crate::reconstruct::evidence::contact_statistics::ContactStatistics;
 use crate::reconstruct::evidence::outliers::{Outlier, Outliers};
 use crate::reconstruct::evidence::touches::SurfaceContact;
@@ -343,7 +343,7 @@ impl ContactMap {
         let (kept, mean) = (&self.kept[index as usize], &mut self.means[index as usize]);
         let (point, normal) = &kept.reported;
         mean.point = kept.sums.point();
-        mean.normal = kept.sums.normal.try_normalize(0.0).unwrap_or(contact.normal);
+        mean.normal = direction(&kept.sums.normal).unwrap_or(contact.normal);
         let before = std::mem::replace(&mut mean.weight, kept.weight());
         let is_back = before == 0.0 && mean.weight > 0.0;
         let is_shifted = is_back

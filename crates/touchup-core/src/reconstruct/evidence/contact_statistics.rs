@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
 use crate::reconstruct::evidence::touches::SurfaceContact;
 
@@ -94,7 +95,7 @@ impl ContactStatistics {
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
     pub fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
-        let normal = self.normal.try_normalize(0.0).unwrap_or(contact.normal);
+        let normal = direction(&self.normal).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();
         let [tilt, of_contact] = [own.normal, contact.sigma.normal].map(|tilt| tilt * tilt + LEAST_TILT * LEAST_TILT);

@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::touches::SurfaceContact;
 
@@ -55,7 +56,8 @@ struct TouchedWall {
 impl TouchedWall {
     /// Standard deviation of the places from which it was touched, across the corner that it makes with another, m.
     fn width(&self, other: &Self) -> f64 {
-        let across = self.facing.cross(&self.facing.cross(&other.facing)).normalize();
+        // of two that face the same way there is no corner, and no width
+        let across = direction(&self.facing.cross(&self.facing.cross(&other.facing))).unwrap_or_default();
         let mean = across.dot(&self.offset) / self.count;
         (across.dot(&(self.spread * across)) / self.count - mean * mean).max(0.0).sqrt()
     }
@@ -137,7 +139,7 @@ fn walls(
             // walls bend: the nearest mean has their normal here
             let nearness = 1.0 - aside_squared / (NEARBY * radius).powi(2);
             wall.normal += mean.normal * (weight * nearness * nearness);
-            wall.facing = wall.normal.try_normalize(0.0).unwrap_or(mean.normal);
+            wall.facing = direction(&wall.normal).unwrap_or(mean.normal);
             wall.weight += weight;
             let from_ball = mean.point + mean.normal * radius - centre;
             wall.count += 1.0;

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
+use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
@@ -152,6 +153,8 @@ pub(crate) struct Evidence<'a> {
     pub tree: &'a FaceTree,
     /// how well the scan was known before; `None`: where something was touched it does not count
     pub prior: Option<UncertaintyParams>,
+    /// whether the scan has no rim, so that what is behind it is known: then the patch has none either
+    pub is_closed: bool,
 }
 
 impl Evidence<'_> {
@@ -313,8 +316,7 @@ impl Evidence<'_> {
         if depth <= 0.0 {
             return (depth, false);
         }
-        let mut is_free = (x - centre)
-            .try_normalize(0.0)
+        let mut is_free = direction(&(x - centre))
             .is_some_and(|direction| self.free_space.is_end(&centre, &direction, p.radius / 2.0));
         self.contacts.near(&centre, FREE_REACH * p.radius, |_, _| is_free = false);
         (depth, is_free)

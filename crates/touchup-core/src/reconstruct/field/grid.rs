@@ -241,7 +241,9 @@ impl ReconstructionGrid {
         for centre in &changes.centres {
             let cell = self.lattice.cell_of(centre);
             let is_near = || evidence.tree.closest(evidence.scan, centre, cover + self.lattice.pitch).is_some();
-            if !self.free_space.contains(&cell) && is_near() {
+            // in a closed scan all of the path is a void with a surface around it
+            let is_inside = || evidence.is_closed && evidence.scan_at(centre).is_some_and(|scan| scan.value < 0.0);
+            if !self.free_space.contains(&cell) && (is_near() || is_inside()) {
                 self.free_space.insert_with(cell, || ());
                 add(&cell, &around_ball);
             }
@@ -275,6 +277,11 @@ impl ReconstructionGrid {
         });
         values
     }
+}
+
+/// How many nodes of a lattice of `pitch` (m) are looked at around one contact of a tip of `radius` (m).
+pub(in crate::reconstruct) fn nodes_around_contact(radius: f64, pitch: f64) -> f64 {
+    4.0 / 3.0 * std::f64::consts::PI * (REACH * radius / pitch).powi(3)
 }
 
 /// The steps from a node to those within `radius` steps.

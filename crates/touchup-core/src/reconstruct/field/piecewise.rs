@@ -11,7 +11,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::numeric::tangent_basis;
+use crate::numeric::{direction, tangent_basis};
 use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
 
 /// How contacts are grouped and weighted.
@@ -194,7 +194,7 @@ impl FieldParams {
             piece.flat_weight += if mean.is_fan { 0.0 } else { mean.weight };
             piece.point += mean.point.coords * mean.weight;
             piece.normal += mean.normal * mean.weight;
-            piece.facing = piece.normal.try_normalize(0.0).unwrap_or(mean.normal);
+            piece.facing = direction(&piece.normal).unwrap_or(mean.normal);
             member.piece = at as u32;
         }
     }
@@ -228,7 +228,7 @@ impl FieldParams {
             member.distance_squared = weight;
         }
         for piece in pieces.iter_mut() {
-            piece.facing = piece.normal.try_normalize(0.0).unwrap_or(piece.facing);
+            piece.facing = direction(&piece.normal).unwrap_or(piece.facing);
             piece.point /= piece.fit_weight;
         }
         for member in near.iter().filter(|member| member.piece != NO_PIECE) {

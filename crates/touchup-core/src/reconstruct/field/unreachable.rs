@@ -4,6 +4,7 @@
 //! surface obstructs it there, no touch is possible.
 
 use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId, corner_normal};
+use crate::numeric::direction;
 use crate::reconstruct::Support;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 
@@ -31,7 +32,7 @@ pub(in crate::reconstruct) fn mark_unreachable(
     let tree = FaceTree::new(&patch);
     let deepest = radius * (1.0 - SLACK);
     for (vertex, support) in (0..).map(VertexId).zip(support) {
-        let Some(normal) = corner_normal(&patch, vertex).try_normalize(0.0) else { continue };
+        let Some(normal) = direction(&corner_normal(&patch, vertex)) else { continue };
         let centre = mesh.position(vertex) + normal * radius;
         let is_blocked = tree.closest(&patch, &centre, deepest).is_some();
         let was_there = || free_space.nearest(&centre).is_some_and(|(distance, _)| distance < SLACK * radius);

@@ -13,7 +13,7 @@ use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, Nod
 use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
-use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid};
+use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid, nodes_around_contact};
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::uncertainty::vertex_sigma;
@@ -111,12 +111,28 @@ impl PatcherParams {
         Ok(params)
     }
 
+    /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built before.
+    fn check_cost(&self) -> Result<(), SettingError> {
+        let nodes = nodes_around_contact(self.evidence.radius, self.pitch);
+        let finest = self.pitch * (nodes / MOST_NODES).cbrt();
+        let why = format!(
+            "{:.2e} or more: the lattice around one contact of a tip of {} mm would have {nodes:.1e} nodes and take {:.1} GB; \
+             a larger patch.pitch_mm takes less",
+            finest * 1e3,
+            self.evidence.radius * 1e3,
+            nodes * NODE_BYTES * 1e-9,
+        );
+        SettingError::check("patch.pitch_mm", self.pitch * 1e3, nodes <= MOST_NODES, &why)
+    }
+
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
     pub fn check(&self) -> Result<(), SettingError> {
         let radius = self.evidence.radius;
-        SettingError::check("tip.radius_mm", radius * 1e3, radius > 0.0, "more than 0 where there is a patch")?;
+        let is_tip = radius >= SMALLEST_TIP;
+        SettingError::check("tip.radius_mm", radius * 1e3, is_tip, "0.01 or more where there is a patch")?;
         PatchParams { pitch: Some(self.pitch), most_faces: self.most_faces }.check()?;
+        self.check_cost()?;
         let noise = self.uncertainty.map_or(0.0, |known| known.scan);
         SettingError::check("scan.noise_mm", noise * 1e3, noise >= 0.0, "0 to 1000 mm")?;
         self.uncertainty.iter().try_for_each(UncertaintyParams::check)
@@ -156,6 +172,8 @@ pub struct Patcher {
     finder: TouchFinder,
     history: TouchHistory,
     live: Option<LivePatch>,
+    /// whether the scan has no rim; `None` before it was seen
+    is_closed: Option<bool>,
 }
 
 /// The patch that a mesh follows.
@@ -190,6 +208,12 @@ impl LivePatch {
     }
 }
 
+/// Smallest radius of a tip that touches for a patch, m: a fifth of the finest stylus that is sold.
+const SMALLEST_TIP: f64 = 1e-5;
+/// Nodes around one contact at most: a ball of 1.5 mm on a lattice of 0.042 mm.
+const MOST_NODES: f64 = 4e6;
+/// Memory of a node while the field around it is made: its state, the scan's distance, its numbers, tables that are half full.
+const NODE_BYTES: f64 = 400.0;
 /// Edge of the cells of one mean contact, in radii.
 const CONTACT_CELL: f64 = 1.0 / 3.0;
 /// Edge of the cells of one centre, in radii.
@@ -225,6 +249,7 @@ impl Patcher {
                 bounds: None,
             },
             live: None,
+            is_closed: None,
             params,
         })
     }
@@ -237,7 +262,13 @@ impl Patcher {
     /// A copy of the touch history, without the state of a mesh that follows.
     pub fn copy(&self) -> Self {
         let Self { params, finder, history, .. } = self;
-        Self { params: *params, finder: finder.clone(), history: history.clone(), live: None }
+        Self {
+            params: *params,
+            finder: finder.clone(),
+            history: history.clone(),
+            live: None,
+            is_closed: self.is_closed,
+        }
     }
 
     /// The settings.
@@ -388,6 +419,7 @@ impl Patcher {
     }
 
     fn update(&mut self, scan: &TriMesh, tree: &FaceTree) {
+        self.is_closed.get_or_insert_with(|| scan.is_closed());
         let changes = self.history.update(scan, tree);
         if let Some(live) = &mut self.live {
             live.changes.extend(&changes);
@@ -403,7 +435,15 @@ impl Patcher {
 
     fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
         let Self { history: TouchHistory { contacts, free_space, .. }, params, .. } = self;
-        Evidence { params: &params.evidence, contacts, free_space, scan, tree, prior: params.scan_prior() }
+        Evidence {
+            params: &params.evidence,
+            contacts,
+            free_space,
+            scan,
+            tree,
+            prior: params.scan_prior(),
+            is_closed: self.is_closed == Some(true),
+        }
     }
 
     fn budget(&self, scan: &TriMesh) -> f64 {

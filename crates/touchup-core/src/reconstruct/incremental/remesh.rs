@@ -15,6 +15,8 @@ use crate::reconstruct::table::CellTable;
 const GROWTH: usize = 3;
 /// Rounds in which the field is looked at further, each two cells, where a surface that is filled in goes on.
 const FURTHER: usize = 4;
+/// Rounds of both on a closed scan, where all that is open can be joined, and is.
+const UNTIL_CLOSED: usize = 64;
 
 /// What is remeshed, and why.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +51,7 @@ impl Remesh {
     pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Renewed {
         let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
-        for _ in 0..FURTHER {
+        for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { FURTHER } {
             self.take_up(&changed, &mut core, &mut left);
             let renewed = self.grow(evidence, core, &left);
             let open = renewed.patch.open.iter().map(|open| open.beyond);
@@ -94,7 +96,7 @@ impl Remesh {
     /// - `left`: cells that are in the region no more.
     fn grow(&mut self, evidence: &Evidence<'_>, mut core: CellBox, left: &[LatticeNode]) -> Renewed {
         let mut renewed = self.contoured(evidence, core, left);
-        for _ in 0..GROWTH {
+        for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { GROWTH } {
             let mut has_grown = false;
             for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.grid.can_take(open.beyond)) {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;

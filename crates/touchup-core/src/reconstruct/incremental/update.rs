@@ -58,7 +58,8 @@ impl ReconstructionGrid {
         let nodes = changed.nodes.iter().zip(turned);
         let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
         changed.at_surface = at_surface.map(|(node, _)| *node).collect();
-        changed.open = self.renew_open(&area, radius);
+        // behind a closed scan the bottom is known
+        changed.open = if evidence.is_closed { Vec::new() } else { self.renew_open(&area, radius) };
         changed
     }
 

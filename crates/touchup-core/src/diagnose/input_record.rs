@@ -1,0 +1,17 @@
+//! A sample as the monitor keeps it.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+/// One sample that is kept.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InputRecord {
+    pub centre: Point3<f64>,
+    pub rotation: UnitQuaternion<f64>,
+    pub force_o: Vector3<f64>,
+}
+
+impl InputRecord {
+    pub fn force_t(&self) -> Vector3<f64> {
+        self.rotation.inverse_transform_vector(&self.force_o)
+    }
+}
