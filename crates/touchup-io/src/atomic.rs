@@ -9,7 +9,8 @@ use tempfile::TempPath;
 /// A file that appears under its name only by [`AtomicFile::commit`].
 ///
 /// Until then it lies beside its target under a temporary name; dropped without commit it is removed and an older
-/// file of that name stays untouched. A link is followed, so that what it points to is replaced.
+/// file of that name stays untouched. A link is followed, also one that leads to no file yet, so that what it points to is
+/// replaced. What a process that was killed has left under a temporary name goes when the next one writes to the same place.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
@@ -24,7 +25,7 @@ impl AtomicFile {
     /// # Errors
     /// The folder is missing, or may not be written to; `path` names something other than a plain file.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let target = followed(path)?;
         let refused = |kind, why: String| Err(io::Error::new(kind, why));
         let Some(name) = target.file_name() else {
             return refused(io::ErrorKind::InvalidInput, "the path names no file".into());
@@ -36,7 +37,9 @@ impl AtomicFile {
         if !folder.is_dir() {
             return refused(io::ErrorKind::NotFound, format!("there is no folder {}: make it first", folder.display()));
         }
-        let prefix = format!(".{}.", name.display());
+        let stem = format!(".{}.", name.display());
+        remove_left(folder, &stem);
+        let prefix = format!("{stem}{}-", std::process::id());
         let beside =
             tempfile::Builder::new().prefix(&prefix).suffix(".part").make_in(folder, |path| File::create_new(path))?;
         let (file, temporary) = beside.into_parts();
@@ -101,6 +104,41 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
 }
 
+/// Links behind one another at most, as on Linux.
+const MOST_LINKS: usize = 40;
+
+/// Where a path leads, whether a file is there or not.
+fn followed(path: &Path) -> io::Result<PathBuf> {
+    let mut target = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        if let Ok(there) = fs::canonicalize(&target) {
+            return Ok(there);
+        }
+        match fs::read_link(&target) {
+            Ok(next) => target = folder_of(&target).join(next),
+            Err(_) => return Ok(target),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::InvalidInput, "its links lead in a circle"))
+}
+
+/// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known they stay.
+fn remove_left(folder: &Path, stem: &str) {
+    let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else { return };
+    if !processes.join("self").exists() {
+        return;
+    }
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let rest = name.to_str().and_then(|name| name.strip_prefix(stem)?.strip_suffix(".part"));
+        let Some((process, _)) = rest.and_then(|rest| rest.split_once('-')) else { continue };
+        if process.parse::<u32>().is_ok_and(|id| !processes.join(id.to_string()).exists()) {
+            // who may not remove it leaves it
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -141,6 +179,49 @@ mod tests {
         let taken = AtomicFile::create(folder.path()).unwrap_err().to_string();
         assert!(taken.contains("not a plain file"), "{taken}");
         assert!(names(folder.path()).is_empty());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_killed_process_left_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        let gone = child.id();
+        child.wait().unwrap();
+        let here = std::process::id();
+        let left = format!(".a.txt.{gone}-x1.part");
+        let stay = [
+            format!(".a.txt.{here}-x1.part"),
+            format!(".b.txt.{gone}-x1.part"),
+            format!(".a.txt.{gone}-x1"),
+            ".a.txt.notes.part".to_owned(),
+            format!("a.txt.{gone}-x1.part"),
+        ];
+        stay.iter().chain([&left]).for_each(|name| fs::write(folder.path().join(name), "half").unwrap());
+        write_atomically(&folder.path().join("a.txt"), |w| w.write_all(b"new")).unwrap();
+        let mut expected = stay.to_vec();
+        expected.push("a.txt".to_owned());
+        expected.sort();
+        let mut found = names(folder.path());
+        found.sort();
+        assert_eq!(found, expected);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_no_file_yet_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("there")).unwrap();
+        let (far, link, first) =
+            (folder.path().join("there/a.txt"), folder.path().join("link"), folder.path().join("first"));
+        std::os::unix::fs::symlink("there/a.txt", &link).unwrap();
+        std::os::unix::fs::symlink("link", &first).unwrap();
+        write_atomically(&first, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read_to_string(&far).unwrap(), "new");
+        assert!([&link, &first].iter().all(|path| fs::symlink_metadata(path).unwrap().is_symlink()));
+        let round = folder.path().join("round");
+        std::os::unix::fs::symlink("round", &round).unwrap();
+        assert!(write_atomically(&round, |w| w.write_all(b"new")).unwrap_err().to_string().contains("circle"));
     }
 
     #[cfg(unix)]

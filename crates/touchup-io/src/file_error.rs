@@ -1,7 +1,8 @@
 //! What can be wrong with any file: it cannot be read or written, and the place of what is wrong in it.
 
 use std::fmt;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::atomic::{AtomicFile, write_atomically};
@@ -48,9 +49,27 @@ impl fmt::Display for FilePlace {
     }
 }
 
-/// All bytes of a file.
+/// Longest file that is read as a whole: its numbers take several times that.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+/// … and longest input whose end is not known before, as that of a pipe.
+const MAX_STREAM_BYTES: u64 = 256 << 20;
+
+/// All bytes of a file, or of a pipe, that is not longer than [`MAX_FILE_BYTES`] or [`MAX_STREAM_BYTES`].
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
-    std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
+    let read = || {
+        let file = File::open(path)?;
+        let info = file.metadata()?;
+        let limit = if info.is_file() { MAX_FILE_BYTES } else { MAX_STREAM_BYTES };
+        let mut bytes = Vec::new();
+        bytes.try_reserve(if info.is_file() { info.len().min(limit) as usize + 1 } else { 0 })?;
+        file.take(limit + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > limit {
+            let why = format!("it is longer than {} MiB, and no end is near: reduce it first", limit >> 20);
+            return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|source| FileError::Read { path: path.to_owned(), source })
 }
 
 /// As [`write_atomically`].

@@ -9,10 +9,12 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
 use super::cdr::MAX_MESSAGE_BYTES;
+use super::framing::NameBytes;
 use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
 
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
@@ -20,6 +22,12 @@ pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 const BATCH_ROWS: usize = 1024;
 /// Largest file that a `.db3.zstd` may unpack to, so that a small file cannot fill the disk.
 const MAX_UNPACKED_BYTES: u64 = 16 << 30;
+
+/// No text or blob of the file, nor anything that its schema computes of them, may be longer: a column may be generated, and then
+/// the file is short and the value is not. SQLite itself refuses it, before it takes the memory.
+const MAX_VALUE_BYTES: i32 = 1 << 20;
+/// Rows of the table of topics.
+const MAX_TOPICS: usize = 65_536;
 
 /// Longer payloads are not loaded; they come as NULL and count as malformed.
 const FETCH: &str = "SELECT id, timestamp, topic_id, CASE WHEN length(data) <= ?1 THEN data END FROM messages \
@@ -56,7 +64,7 @@ impl Db3Reader {
             let reason = "a SQLite file without rosbag2's tables `topics` and `messages`".to_owned();
             return Err(RecordingError::NotARecording { path: path.to_owned(), reason });
         }
-        let rows = read_topics(&db).map_err(|error| damaged(error.into()))?;
+        let rows = read_topics(&db).map_err(damaged)?;
         let failed = find_cut(&db, db_path).err();
         let id_of = |kind| rows.iter().find(|(_, info)| info.name == topics.name(kind)).map(|(id, _)| *id);
         Ok(Self {
@@ -136,7 +144,8 @@ impl RecordingFile for Db3Reader {
 fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let db = Connection::open_with_flags(immutable_uri(path), flags)?;
-    // the file is not trusted: no functions from its schema, no cells that leave their page
+    // the file is not trusted: no functions from its schema, no cells that leave their page, no value without end
+    db.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)?;
     db.pragma_update(None, "trusted_schema", false)?;
     db.pragma_update(None, "cell_size_check", true)?;
     Ok(db)
@@ -156,17 +165,22 @@ fn immutable_uri(path: &Path) -> String {
 }
 
 fn has_tables(db: &Connection) -> rusqlite::Result<bool> {
-    let count = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name IN ('topics', 'messages')";
+    // a virtual table has no root page
+    let count =
+        "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 AND name IN ('topics', 'messages')";
     db.query_row(count, [], |row| row.get::<_, i64>(0)).map(|tables| tables == 2)
 }
 
-fn read_topics(db: &Connection) -> rusqlite::Result<Vec<(i64, TopicInfo)>> {
-    let mut statement =
-        db.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT 65536")?;
-    let rows = statement.query_map([], |row| {
-        Ok((row.get(0)?, TopicInfo { name: row.get(1)?, type_name: row.get(2)?, encoding: row.get(3)? }))
-    })?;
-    rows.collect()
+fn read_topics(db: &Connection) -> Result<Vec<(i64, TopicInfo)>, Damage> {
+    let mut statement = db.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT ?1")?;
+    let mut rows = statement.query([MAX_TOPICS as i64])?;
+    let (mut topics, mut name_bytes) = (Vec::new(), NameBytes::default());
+    while let Some(row) = rows.next()? {
+        let info = TopicInfo { name: row.get(1)?, type_name: row.get(2)?, encoding: row.get(3)? };
+        name_bytes.take(info.name_bytes(), 0)?;
+        topics.push((row.get(0)?, info));
+    }
+    Ok(topics)
 }
 
 /// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses itself).

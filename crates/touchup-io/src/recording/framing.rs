@@ -10,6 +10,8 @@ use super::Damage;
 const MAX_RECORD_BYTES: u64 = 256 << 20;
 /// Longest name of a topic or type: the names of all channels are kept, and packed bytes can pretend to be long ones.
 const MAX_TEXT_BYTES: u64 = 64 << 10;
+/// All names of topics and types of a recording together: many long ones would fill the memory.
+const MAX_NAMES_BYTES: u64 = 16 << 20;
 /// Opcode and length in front of every record.
 pub(super) const HEAD_BYTES: usize = 9;
 /// Piece in which unused records are skipped.
@@ -33,6 +35,21 @@ pub(super) fn check_crc(what: &'static str, stored: u32, computed: u32) -> Resul
 
 pub(super) fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage> {
     if bytes <= MAX_RECORD_BYTES { Ok(()) } else { Err(Damage::TooLong { what, bytes, limit: MAX_RECORD_BYTES }) }
+}
+
+/// Counts the bytes of the names that are kept, and refuses more than [`MAX_NAMES_BYTES`].
+#[derive(Default)]
+pub(super) struct NameBytes(u64);
+
+impl NameBytes {
+    /// Takes in a name of `bytes` in the place of one of `replaced`.
+    pub fn take(&mut self, bytes: usize, replaced: usize) -> Result<(), Damage> {
+        self.0 = (self.0 + bytes as u64).saturating_sub(replaced as u64);
+        if self.0 <= MAX_NAMES_BYTES {
+            return Ok(());
+        }
+        Err(Damage::TooLong { what: "names of topics and types", bytes: self.0, limit: MAX_NAMES_BYTES })
+    }
 }
 
 /// The bytes of a file from front to end, with position and checksum.

@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::error::check_topic;
-use super::framing::{ByteStream, Fields, HEAD_BYTES, check_crc, check_length, op, split_record};
+use super::framing::{ByteStream, Fields, HEAD_BYTES, NameBytes, check_crc, check_length, op, split_record};
 use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -229,13 +229,16 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
 struct Described {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, TopicInfo>,
+    name_bytes: NameBytes,
 }
 
 impl Described {
     fn add_schema(&mut self, body: &[u8]) -> Result<(), Damage> {
         let mut fields = Fields(body);
         let id = fields.u16("number of a schema")?;
-        self.schemas.insert(id, fields.text("name of a schema")?);
+        let name = fields.text("name of a schema")?;
+        self.name_bytes.take(name.len(), self.schemas.get(&id).map_or(0, String::len))?;
+        self.schemas.insert(id, name);
         Ok(())
     }
 
@@ -249,7 +252,9 @@ impl Described {
             None if schema == 0 => "without a type".to_owned(),
             None => return Err(Damage::Undescribed { what: "schema", id: schema }),
         };
-        self.channels.insert(id, TopicInfo { name, type_name, encoding });
+        let info = TopicInfo { name, type_name, encoding };
+        self.name_bytes.take(info.name_bytes(), self.channels.get(&id).map_or(0, TopicInfo::name_bytes))?;
+        self.channels.insert(id, info);
         Ok(id)
     }
 

@@ -129,6 +129,13 @@ struct TopicInfo {
     encoding: String,
 }
 
+impl TopicInfo {
+    /// Memory of its names, bytes.
+    fn name_bytes(&self) -> usize {
+        self.name.len() + self.type_name.len() + self.encoding.len()
+    }
+}
+
 /// A message as it lies in the file.
 struct RawMessage<'a> {
     kind: TopicKind,

@@ -12,6 +12,7 @@ use touchup::io::recording::{BadMessage, FilePlace, RecordingError, RecordingRea
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
 mod damage;
+mod lengths;
 mod made;
 mod markers;
 mod resumed;
