@@ -123,7 +123,7 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
     print_report(arguments.json, &report, || match arguments.verbose {
         true => format!("{report}\n{}", report.details()),
         false => report.to_string(),
-    });
+    })?;
     Ok(Losses::new())
 }
 

@@ -104,7 +104,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     };
     write_json(&out.join("summary.json"), &demo)?;
     let picture = out.join("deviation.png");
-    print_result(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", out.display(), picture.display()));
+    print_result(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", out.display(), picture.display()))?;
     Ok(losses)
 }
 

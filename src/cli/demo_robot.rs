@@ -164,7 +164,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     print_result(&format!(
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
         out.display()
-    ));
+    ))?;
     outcome
 }
 

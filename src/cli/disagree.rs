@@ -152,7 +152,7 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
         write_coloured(path, mesh, unit, &colours, columns)?;
     }
     let report = DisagreeReport::of(&found);
-    print_report(arguments.json, &report, || report.to_string());
+    print_report(arguments.json, &report, || report.to_string())?;
     Ok(Losses::new())
 }
 

@@ -108,7 +108,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     print_report(arguments.json, &diagnosis, || {
         let lines = diagnosis.findings.iter().map(ToString::to_string).collect::<Vec<_>>();
         if lines.is_empty() { "nothing speaks against scan and recording".to_owned() } else { lines.join("\n") }
-    });
+    })?;
     match diagnosis.findings.first() {
         Some(first) if first.is_sure => Err(CliError::new(("input", 3), first, None)),
         _ => Ok(replayed.losses),

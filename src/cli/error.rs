@@ -150,8 +150,12 @@ pub(super) fn print_error(as_json: bool, error: &CliError) -> ExitCode {
 pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> ExitCode {
     let exit_code = error.exit_code() as u8;
     if exit_code == 0 || !as_json {
-        let _ = error.print();
-        return ExitCode::from(exit_code);
+        return match error.print() {
+            Err(failed) if exit_code == 0 && failed.kind() != ErrorKind::BrokenPipe => {
+                print_error(as_json, &failed.into())
+            }
+            _ => ExitCode::from(exit_code),
+        };
     }
     let text = error.to_string();
     let message = text.split("\n\n").next().unwrap_or(&text);

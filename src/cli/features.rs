@@ -82,7 +82,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
         write_features(out, &file)?;
     }
     let wrote = arguments.out.as_ref().map_or(String::new(), |out| format!("\nwrote {}", out.display()));
-    print_report(arguments.json, &file, || format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}"));
+    print_report(arguments.json, &file, || format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}"))?;
     Ok(Losses::new())
 }
 

@@ -181,13 +181,13 @@ impl Verb {
             Self::Completions { shell } => {
                 let mut script = Vec::new();
                 clap_complete::generate(*shell, &mut Arguments::command(), "touchup", &mut script);
-                print_result(String::from_utf8_lossy(&script).trim_end());
+                print_result(String::from_utf8_lossy(&script).trim_end())?;
                 Ok(Losses::new())
             }
             Self::Man => {
                 let mut page = Vec::new();
                 clap_mangen::Man::new(Arguments::command()).render(&mut page)?;
-                print_result(String::from_utf8_lossy(&page).trim_end());
+                print_result(String::from_utf8_lossy(&page).trim_end())?;
                 Ok(Losses::new())
             }
             #[cfg(feature = "ur")]

@@ -38,8 +38,8 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     }
     let ready = Prepared::new(config.parameters.clone())?;
     let (scan, faces) = ready.scan();
-    print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()));
-    print_result(&ready.cost(config.parameters.string("robot") != "none").to_string());
+    print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
+    print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let port = ros::start(&config, inbox)?;
@@ -50,9 +50,9 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
         "{} listens to {}; Ctrl-C saves and ends it",
         config.place.full_name(),
         topics.join(" and ")
-    ));
+    ))?;
     let NodeEnd { folder, report } = running.join()?;
-    print_report(arguments.json, &report, || format!("{report}\nwrote {}", folder.join("refined.ply").display()));
+    print_report(arguments.json, &report, || format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
     Ok(losses(&report))
 }
 

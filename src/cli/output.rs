@@ -1,7 +1,7 @@
 //! What the verbs write: results on stdout, files, and the checks of their places before the work begins.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write, stdout};
+use std::io::{self, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -10,15 +10,23 @@ use super::error::{CliError, require};
 use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
 use crate::io::file_error::FileError;
 
-/// One line, or several, on stdout. A reader that has gone away is no error of ours.
-pub(super) fn print_result(text: &str) {
-    let _ = writeln!(stdout(), "{text}");
+/// One line, or several, on stdout: whole, or an error. A reader that has gone away wants no more and is none.
+pub(super) fn print_result(text: &str) -> Result<(), CliError> {
+    let mut out = stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
 }
 
 /// A result as one JSON object, or in words.
-pub(super) fn print_report(as_json: bool, report: &impl Serialize, in_words: impl FnOnce() -> String) {
+pub(super) fn print_report(
+    as_json: bool,
+    report: &impl Serialize,
+    in_words: impl FnOnce() -> String,
+) -> Result<(), CliError> {
     let json = || serde_json::to_string(report).expect("finite numbers and names alone cannot fail");
-    print_result(&if as_json { json() } else { in_words() });
+    print_result(&if as_json { json() } else { in_words() })
 }
 
 /// Counts by their reasons, in words.

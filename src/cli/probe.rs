@@ -133,7 +133,7 @@ impl ProbeArguments {
             return ready.may_move().map(|()| Losses::new());
         }
         let report = DryRunReport::of(probing.flags, &plans, [x, y, z], self.out.join("plan.png"));
-        print_report(self.json, &report, || report.to_string());
+        print_report(self.json, &report, || report.to_string())?;
         Ok(Losses::new())
     }
 
@@ -153,7 +153,7 @@ impl ProbeArguments {
             let written = names.iter().filter(|name| are_all || **name != "touches.png");
             let files: Vec<_> = written.map(|name| self.out.join(name).display().to_string()).collect();
             format!("{summary}\nwrote {}", files.join(", "))
-        });
+        })?;
         outcome
     }
 }

@@ -23,7 +23,7 @@ pub(super) struct RecoverArguments {
 pub(super) fn recover(arguments: &RecoverArguments) -> Result<Losses, CliError> {
     let mut arm = recovered_ur(&Scene::read(&arguments.scene)?)?;
     let recovered = Recovered::of(&arm.next_state().map_err(CliError::arm)?);
-    print_report(arguments.json, &recovered, || recovered.to_string());
+    print_report(arguments.json, &recovered, || recovered.to_string())?;
     Ok(Losses::new())
 }
 

@@ -172,7 +172,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
         let details =
             if arguments.verbose { format!("\nscan file: {repair}\n{}", summary.details()) } else { String::new() };
         format!("{summary}{details}\nwrote {}", arguments.out.display())
-    });
+    })?;
     Ok(losses)
 }
 

@@ -126,7 +126,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         let wrenches = counted(played.wrenches, "wrench", "wrenches");
         let poses = counted(played.poses, "pose", "poses");
         format!("played {wrenches} and {poses} in {:.1} s", played.played_s)
-    });
+    })?;
     Ok(losses)
 }
 

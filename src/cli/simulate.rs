@@ -120,7 +120,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         scan.face_count(),
         touch.messages.len(),
         out.display()
-    ));
+    ))?;
     Ok(Losses::new())
 }
 

@@ -26,7 +26,7 @@ pub(super) fn ur(arguments: &UrArguments) -> Result<Losses, CliError> {
     match arguments {
         UrArguments::Setup { folder, python } => {
             let site_packages = setup(folder, python.as_deref())?;
-            print_result(&format!("site_packages: {}", site_packages.display()));
+            print_result(&format!("site_packages: {}", site_packages.display()))?;
         }
         UrArguments::Child => child::run()?,
     }

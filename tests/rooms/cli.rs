@@ -613,3 +613,41 @@ fn the_version_names_the_commit() {
     let hash = commit.unwrap_or_default().split(',').next().unwrap_or_default();
     assert!(hash == "unknown" || hash.len() == 12 && hash.chars().all(|c| c.is_ascii_hexdigit()), "{printed}");
 }
+
+// ---- stdout that takes nothing ------------------------------------------------------------------------------------
+
+/// A result that did not reach stdout was not written: exit 1, whatever the verb.
+#[test]
+fn a_result_that_stdout_does_not_take_is_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("plate.stl");
+    let corner = |x: f64, y: f64| format!("vertex {x} {y} 0\n");
+    let facet = |corners: [(f64, f64); 3]| {
+        let corners: String = corners.iter().map(|&(x, y)| corner(x, y)).collect();
+        format!("facet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    let facets = [facet([(0.0, 0.0), (40.0, 0.0), (0.0, 40.0)]), facet([(40.0, 0.0), (40.0, 40.0), (0.0, 40.0)])];
+    fs::write(&mesh, format!("solid plate\n{}endsolid plate\n", facets.concat())).unwrap();
+    let mesh = mesh.to_str().unwrap();
+    let cases = [
+        &["features", mesh][..],
+        &["features", mesh, "--json"],
+        &["compare", mesh, mesh],
+        &["compare", mesh, mesh, "--json"],
+        &["completions", "bash"],
+        &["man"],
+        &["--help"],
+        &["--version"],
+    ];
+    for arguments in cases {
+        let with = |stdout: Stdio| {
+            let command = &mut Command::new(env!("CARGO_BIN_EXE_touchup"));
+            command.args(arguments).env_remove("RUST_LOG").stdin(Stdio::null()).stdout(stdout).output().unwrap()
+        };
+        let taken = with(Stdio::piped());
+        assert_eq!((code(&taken), text(&taken.stderr)), (0, ""), "{arguments:?}");
+        let full = with(fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into());
+        assert_eq!(code(&full), 1, "{arguments:?}: {}", text(&full.stderr));
+        assert!(text(&full.stderr).contains("stdout"), "{arguments:?}: {}", text(&full.stderr));
+    }
+}

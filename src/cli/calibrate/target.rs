@@ -74,7 +74,7 @@ impl CalibrationTarget {
         };
         let text = Scene::edited(&start, &settings, &remark, &expected)?;
         write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
-        print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()));
+        print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()))?;
         Ok(())
     }
 }

@@ -86,7 +86,7 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
     if let Some(out) = out {
         write_json(out, &report)?;
     }
-    print_report(*json, &report, || report.to_string());
+    print_report(*json, &report, || report.to_string())?;
     Ok(report.losses())
 }
 

@@ -182,7 +182,7 @@ pub(super) fn aligned_by_features(
         (None, None) => &found[0],
         (None, Some(error)) => {
             let choices = Choices::of(&found, counts, &error);
-            print_report(json, &choices, || choices.to_string());
+            print_report(json, &choices, || choices.to_string())?;
             return Err(error.into());
         }
     };

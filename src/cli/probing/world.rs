@@ -234,10 +234,10 @@ impl<'a> SpotWorld<'a> {
         measured.map_err(|error| match (self.made.len(), self.log.path()) {
             (0, _) => error,
             (count, Some(path)) => error.with(format_args!("the {what} ({count}) are in {}", path.display())),
-            (count, None) => {
-                print_result(&self.made.join("\n"));
-                error.with(format_args!("the {what} ({count}) are printed; {flag} keeps all of them"))
-            }
+            (count, None) => match print_result(&self.made.join("\n")) {
+                Ok(()) => error.with(format_args!("the {what} ({count}) are printed; {flag} keeps all of them")),
+                Err(lost) => error.with(format_args!("the {what} ({count}) are lost: {}", lost.message)),
+            },
         })
     }
 }
