@@ -78,6 +78,8 @@ pub(super) fn write_told_scene(drawn: &DrawnWorld, lever: f64, path: &Path) -> R
     let turn = told.scan_to_space.rotation.coords;
     // what a light force is told from: six deviations of the noise and what steps and play of the sensor add
     let on_n = 0.4f64.max(6.0 * sensor.force_noise + sensor.force_play + sensor.force_step);
+    // … and what may be left of the zero
+    let free_n = 0.15f64.max(3.0 * told.stds.tare + sensor.force_play + sensor.force_step);
     let gap_ms = 30f64.max(2.5e3 / sensor.pose_rate);
     let text = format!(
         "# What is told of world {world}, seed {seed}; truth.json has the truth beside it.\n\
@@ -86,7 +88,7 @@ pub(super) fn write_told_scene(drawn: &DrawnWorld, lever: f64, path: &Path) -> R
          scan_to_space:\n  position_mm: {place}\n  orientation_xyzw: {turn:?}\n\
          compensation:\n  bias:\n    force_n: {tare:?}\n    torque_nm: [0, 0, 0]\n\
          bias_tracking:\n\
-         contact:\n  on_n: {on_n}\n  off_n: {off_n}\n\
+         contact:\n  on_n: {on_n}\n  off_n: {off_n}\n  free_n: {free_n}\n\
          tip:\n  offset_mm: {tip}\n  radius_mm: {radius}\n  stiffness_n_per_mm: {stiffness}\n\
          scan:\n  file: scan.ply\n  unit: mm\n  noise_mm: {noise}\n\
          sliding:\n\

@@ -51,7 +51,7 @@ fn refine_params() -> RefineParams {
 /// As an engine with a patch has it.
 fn refiner(scan: &TriMesh) -> Refiner {
     let params = refine_params();
-    let bias = params.gate.as_ref().map(BiasParams::below);
+    let bias = params.gate.map(|_| BiasParams::default());
     Refiner::new(scan.clone(), RefineParams { bias, ..params }).unwrap()
 }
 

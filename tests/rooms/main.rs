@@ -26,6 +26,7 @@ mod features;
 mod haptic;
 mod io;
 mod layers;
+mod light_touch;
 mod live;
 mod mesh;
 #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -322,8 +322,8 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
     let bias = |yaml: &str| Scene::from_yaml(yaml).unwrap().refine_params(WrenchFrame::Sensor).unwrap().bias;
     assert_eq!(bias("refine:"), None);
     assert_eq!(bias("{ refine: , bias_tracking: }"), Some(BiasParams::default()));
-    let named = bias("{ refine: , bias_tracking: { free_n: 0.5, settle_ms: 20, time_s: 2 } }");
-    assert_eq!(named, Some(BiasParams { free: 0.5, settle_ns: 20_000_000, time: 2.0 }));
+    let named = bias("{ refine: , bias_tracking: { settle_ms: 20, time_s: 2 } }");
+    assert_eq!(named, Some(BiasParams { settle_ns: 20_000_000, time: 2.0 }));
     assert_eq!(bias("{ refine: { mode: paper }, bias_tracking: }"), None);
     let text = Scene::from_yaml("bias_tracking: { time_s: 0 }").unwrap_err().to_string();
     assert!(text.contains("bias_tracking.time_s is 0"), "{text}");

@@ -30,11 +30,11 @@ compensation.payload.centre_mm mm [0,0,0] -10000 10000
 compensation.payload.gravity_m_per_s2 m/s² [0,0,-9.81] -100 100
 compensation.bias.force_n N [0,0,0] -10000 10000
 compensation.bias.torque_nm N·m [0,0,0] -10000 10000
-bias_tracking.free_n N 0.3 1e-6 1000
 bias_tracking.settle_ms ms 60 0.001 60000
 bias_tracking.time_s s 0.3 1e-6 1e6
 contact.on_n N 0.4 0 1000
 contact.off_n N 0.22 0 1000
+contact.free_n N 0.15 0 1000
 tip.radius_mm mm 1.5 0 1000
 tip.edge_radius_mm mm - 0 1000
 tip.half_angle_deg degrees - 1 80

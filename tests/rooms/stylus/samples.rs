@@ -502,6 +502,6 @@ fn the_gate_holds_between_its_thresholds_and_remembers_the_onset() {
 #[test]
 fn a_gate_that_cannot_close_is_refused() {
     for (on, off) in [(0.2, 0.4), (f64::NAN, 0.1), (0.4, -0.1), (f64::INFINITY, 0.0)] {
-        assert!(ContactGate::new(ContactGateParams { on, off }).is_err(), "{on} {off}");
+        assert!(ContactGate::new(ContactGateParams { on, off, ..ContactGateParams::default() }).is_err(), "{on} {off}");
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::{CarveParams, Case, MOST_LOOKED_AT, Refiner, RegionFit, Update};
 use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::numeric::length_and_direction;
-use crate::stylus::{Ball, TipBody, TipPlace};
+use crate::stylus::{Ball, TipBody, TipPlace, TouchState};
 
 /// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
 const MOST_OTHERS: usize = 6;
@@ -25,11 +25,11 @@ struct Inside {
 }
 
 impl Refiner {
-    /// Moves what is inside the tip out of it.
-    pub(super) fn carve(&mut self, ball: &Ball, is_in_contact: bool, dt: f64, update: Update) -> Update {
+    /// Moves what is inside the tip out of it, unless the touch is too light to say so.
+    pub(super) fn carve(&mut self, ball: &Ball, state: TouchState, dt: f64, update: Update) -> Update {
         let Some(carve) = self.params.carve else { return update };
         // a mesh that the tip does not enter by more than the tolerance is left alone
-        let (tolerance, hint) = if is_in_contact {
+        let (tolerance, hint) = if state == TouchState::Contact {
             (carve.contact_tolerance.max(carve.tolerance), self.contact_region.roi.handle)
         } else {
             (carve.tolerance, self.carve_region.roi.handle)
@@ -42,6 +42,9 @@ impl Refiner {
         };
         // before the face is moved
         let mismatch = (update.case == Case::Free).then(|| self.mismatch_in_free_motion(ball, hit.face));
+        if state == TouchState::Light {
+            return Update { mismatch, ..update };
+        }
         let counts = self.body.is_ball() && !self.deformable.is_stiff(hit.face);
         let first = if counts { self.penetration(&place.centre, &hit) } else { None };
         let mut fit = first.map(|inside| self.displace(&carve, hit.face, &inside, dt));

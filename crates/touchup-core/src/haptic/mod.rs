@@ -35,7 +35,7 @@ use crate::mesh::{BoxQuery, Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
     Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
-    SettingError, TipBody, TipPlace,
+    SettingError, TipBody, TipPlace, TouchState,
 };
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
@@ -125,6 +125,8 @@ pub struct RefineCounts {
     pub moved: u64,
     /// updates shortened or given up to keep the mesh sound
     pub cut_back: u64,
+    /// neither in contact nor free: the end of a contact, or a touch too light for one
+    pub light: u64,
     /// contacts beyond the reach of any face
     pub out_of_reach: u64,
     /// contacts outside the region that may be touched
@@ -242,7 +244,8 @@ impl Refiner {
     }
 
     fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
-        let &ContactSample { ball, dt, ball_contact, surface, .. } = self.contacts.observe(sample)?;
+        let observed = self.contacts.observe(sample)?;
+        let (state, &ContactSample { ball, dt, ball_contact, surface, .. }) = (observed.ball_state(), observed);
         let dt = dt.min(LONGEST_HOLD);
         self.deformable.now_ns = sample.stamp_ns;
         if !self.body.is_ball() {
@@ -254,6 +257,7 @@ impl Refiner {
         let update = match ball_contact {
             None => {
                 self.begun = None;
+                self.counts.light += u64::from(state == TouchState::Light);
                 Update::FREE
             }
             Some(_) if is_outside => {
@@ -272,7 +276,7 @@ impl Refiner {
             }
         };
         self.counts.accepted += 1;
-        Ok(if is_outside { update } else { self.carve(&ball, ball_contact.is_some(), dt, update) })
+        Ok(if is_outside { update } else { self.carve(&ball, state, dt, update) })
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.

@@ -1,24 +1,20 @@
 //! Slow drift of a force sensor, followed while nothing is touched.
 //!
 //! In free air a sensor whose weight and bias were taken off reads its drift alone: d b/dt = (f − b) / T. A light contact
-//! looks the same, so only a small and lasting force counts, and the start of a contact is taken back: when the force
-//! leaves the range of free air, the bias returns to what it was before the last settling time.
+//! looks the same, so only lasting free motion counts, and the start of a contact is taken back: when free motion ends, the
+//! bias returns to what it was before the last settling time.
 
 use nalgebra::Vector3;
 
-use super::{ContactGateParams, SettingError, Tip};
+use super::{SettingError, Tip};
 use crate::parameters;
 
 parameters! {
     /// Settings of a [`BiasTracker`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct BiasParams in "bias_tracking" {
-        /// A force within this of the bias is free air.
-        ///
-        /// In N. Above the noise of a usual sensor, below a contact. A bias that is larger from the start is never found: take it off
-        /// by [`super::CompensatorParams::bias_s`].
-        free: f64 = 0.3, "free_n" [N, 1e-6, 1000];
-        /// It is free air once the force has been there for this time; what was learnt in this time before a contact is dropped.
+        /// It is free air once the motion has been free for this time (contact.free_n); what was learnt in this time before a contact is
+        /// dropped.
         ///
         /// In ns. A hand rises to 0.3 N and falls from it within 10 ms.
         settle_ns: i64 = 60.0, "settle_ms" [MS, 0.001, 60000];
@@ -29,17 +25,8 @@ parameters! {
     }
 }
 
-/// Free air ends at this share of the force that begins a contact.
-const FREE_SHARE: f64 = 0.75;
-
-impl BiasParams {
-    /// The defaults, with free air well below the onset of a contact.
-    pub fn below(gate: &ContactGateParams) -> Self {
-        Self { free: FREE_SHARE * gate.on, ..Self::default() }
-    }
-}
-
-/// Follows the bias of the force in the axes of the stylus, in which a sensor that is fixed to it drifts.
+/// Follows the bias of the force in the axes of the stylus, in which a sensor that is fixed to it drifts. A bias that is larger from the
+/// start than what counts as free motion is never found: take it off by [`super::CompensatorParams::bias_s`].
 ///
 /// # Example
 /// ```
@@ -49,7 +36,7 @@ impl BiasParams {
 /// let drift = Vector3::new(0.1, 0.0, -0.05);
 /// for ms in 0..3000 {
 ///     let free = Tip { stamp_ns: ms * 1_000_000, pose_ot: Isometry3::identity(), force_o: drift, torque_o: Vector3::zeros() };
-///     tracker.compensate(&free);
+///     tracker.compensate(&free, |rest| rest.norm() < 0.15);
 /// }
 /// assert!((tracker.bias_t() - drift).norm() < 1e-4);
 /// # Ok::<(), touchup_core::stylus::SettingError>(())
@@ -79,13 +66,14 @@ impl BiasTracker {
     /// The force of the next tip without the bias, N, in O.
     ///
     /// - `tip`: later than the one before.
+    /// - `is_free`: whether a force without the bias, N, is one of free motion.
     #[inline]
-    pub fn compensate(&mut self, tip: &Tip) -> Vector3<f64> {
+    pub fn compensate(&mut self, tip: &Tip, is_free: impl FnOnce(&Vector3<f64>) -> bool) -> Vector3<f64> {
         let rotation = &tip.pose_ot.rotation;
         let rest_t = rotation.inverse_transform_vector(&tip.force_o) - self.bias_t;
         let since_last_ns = tip.stamp_ns.saturating_sub(self.last_ns);
         self.last_ns = tip.stamp_ns;
-        if rest_t.norm() >= self.params.free {
+        if !is_free(&rest_t) {
             self.touch();
         } else {
             // what happened in a long pause is unknown
@@ -135,6 +123,10 @@ mod tests {
         Tip { stamp_ns: ms * MS, pose_ot, force_o, torque_o: Vector3::zeros() }
     }
 
+    fn is_below(rest: &Vector3<f64>) -> bool {
+        rest.norm() < 0.3
+    }
+
     fn tracker() -> BiasTracker {
         BiasTracker::new(BiasParams::default()).unwrap()
     }
@@ -145,7 +137,7 @@ mod tests {
         let drift = Vector3::new(0.1, -0.05, 0.2);
         let mut tracker = tracker();
         for ms in 0..=1000 {
-            let rest = tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift));
+            let rest = tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift), is_below);
             let share = if ms < 60 { 0.0 } else { 1.0 - (-((ms - 59) as f64) * 1e-3 / 0.3).exp() };
             assert!((tracker.bias_t() - drift * share).norm() < 1e-12, "{ms} ms");
             assert_eq!(rest, drift - tracker.bias_t());
@@ -160,7 +152,7 @@ mod tests {
         for ms in 0..8000 {
             let t = ms as f64 * 1e-3;
             let rotation = UnitQuaternion::from_euler_angles(0.7 * t, -0.4 * t, 1.1 * t);
-            let rest_o = tracker.compensate(&tip(ms, rotation, rotation * (slope * t)));
+            let rest_o = tracker.compensate(&tip(ms, rotation, rotation * (slope * t)), is_below);
             if ms > 4000 {
                 assert!((rest_o - rotation * (slope * time)).norm() < 1e-4, "{rest_o}");
             }
@@ -176,7 +168,7 @@ mod tests {
             let (turn, within) = (ms / 1000, ms % 1000);
             let ramp = 10 + turn * 30 / 20;
             let level = ((within - 600).min(1000 - within).clamp(0, ramp)) as f64 / ramp as f64;
-            tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift + Vector3::z() * (2.0 * level)));
+            tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift + Vector3::z() * (2.0 * level)), is_below);
             if ms > 14_000 && level > 0.5 {
                 assert!((tracker.bias_t() - drift).norm() < 1e-6, "{ms} ms: {}", tracker.bias_t());
             }
@@ -188,7 +180,7 @@ mod tests {
         for force in [2.0, 0.3] {
             let mut tracker = tracker();
             for ms in 0..5000 {
-                tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::z() * force));
+                tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::z() * force), is_below);
             }
             assert_eq!(tracker.bias_t(), Vector3::zeros());
         }
@@ -198,10 +190,10 @@ mod tests {
     fn one_sample_after_a_pause_does_not_count_for_all_of_it() {
         let mut tracker = tracker();
         for ms in 0..2000 {
-            tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::x() * 0.1));
+            tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::x() * 0.1), is_below);
         }
         let before = tracker.bias_t();
-        tracker.compensate(&tip(60_000, UnitQuaternion::identity(), Vector3::x() * -0.15));
+        tracker.compensate(&tip(60_000, UnitQuaternion::identity(), Vector3::x() * -0.15), is_below);
         assert_eq!(tracker.bias_t(), before);
     }
 
@@ -209,8 +201,8 @@ mod tests {
     fn settings_without_a_meaning_are_refused() {
         let good = BiasParams::default();
         for bad in [
-            BiasParams { free: 0.0, ..good },
-            BiasParams { free: f64::NAN, ..good },
+            BiasParams { settle_ns: -1, ..good },
+            BiasParams { time: f64::NAN, ..good },
             BiasParams { settle_ns: 0, ..good },
             BiasParams { time: -1.0, ..good },
         ] {

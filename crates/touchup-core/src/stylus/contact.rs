@@ -7,6 +7,8 @@ use crate::parameters;
 
 /// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one that bounces.
 pub(crate) const STROKE_PAUSE_NS: i64 = 100_000_000;
+/// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
+pub(crate) const LONGEST_HOLD: f64 = 0.03;
 
 parameters! {
     /// The two thresholds of a [`ContactGate`].
@@ -21,6 +23,11 @@ parameters! {
         ///
         /// In N. Above noise and bias together, and so far below `on` that the noise at the threshold does not chatter.
         off: f64 = 0.22, "off_n" [N, 0, 1000];
+        /// Below on_n, what the zero of the sensor may be off by: a force above this that its noise does not explain may be a light touch,
+        /// which neither moves the mesh nor frees space.
+        ///
+        /// In N. Three times the 0.05 N by which the bias of a usual sensor varies.
+        free: f64 = 0.15, "free_n" [N, 0, 1000];
     }
     check ContactGateParams::is_in_order;
 }
@@ -30,6 +37,17 @@ impl ContactGateParams {
         let allowed = format!("contact.off_n to 1000 N, and contact.off_n is {}", self.off);
         SettingError::check("contact.on_n", self.on, self.on >= self.off, &allowed)
     }
+}
+
+/// What a force says of the stylus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TouchState {
+    /// It presses.
+    Contact,
+    /// It may press, too lightly for a contact: that says nothing of where material is.
+    Light,
+    /// Nothing is touched.
+    Free,
 }
 
 /// A contact that is going on.

@@ -12,13 +12,12 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::free_motion::FreeMotion;
 use super::{
     Ball, BiasParams, BiasTracker, Compensator, CompensatorParams, Contact, ContactGate, ContactGateParams,
-    FrictionCoefficient, NormalEstimate, Sample, SampleError, SettingError, SlidingParams, Tip, TipMotion, TipParams,
+    FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError, SettingError, SlidingParams, Tip,
+    TipMotion, TipParams, TouchState,
 };
-
-/// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
-pub(crate) const LONGEST_HOLD: f64 = 0.03;
 
 /// Settings of a [`ContactEstimator`]. What is `None` is not built.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +40,7 @@ impl ContactEstimatorParams {
         let gate = ContactGateParams::default();
         Self {
             compensator: CompensatorParams::default(),
-            bias: Some(BiasParams::below(&gate)),
+            bias: Some(BiasParams::default()),
             gate: Some(gate),
             tip,
             sliding: Some(SlidingParams::default()),
@@ -68,8 +67,10 @@ pub struct ContactSample {
     pub bias_t: Vector3<f64>,
     /// real centre of the ball, m, in O: the reported one and the deflection of the stylus
     pub centre: Point3<f64>,
-    /// by the unsmoothed force; `None` in free motion
+    /// by the unsmoothed force; `None` in free motion, and for a touch too light for the thresholds
     pub contact: Option<Contact>,
+    /// whether nothing is touched: noise and zero of the sensor explain the force. Neither this nor in contact: perhaps a light touch
+    pub is_free: bool,
     /// the ball smoothed by the past
     pub ball: Ball,
     /// … and its contact, by the force smoothed alike; `None` in free motion
@@ -82,6 +83,24 @@ impl ContactSample {
     /// Whether the stylus touches, by the unsmoothed force.
     pub fn is_in_contact(&self) -> bool {
         self.contact.is_some()
+    }
+
+    /// What the unsmoothed force says.
+    pub fn state(&self) -> TouchState {
+        state_of(self.contact, self.is_free)
+    }
+
+    /// What the force says that is smoothed by the past.
+    pub fn ball_state(&self) -> TouchState {
+        state_of(self.ball_contact, self.is_free)
+    }
+}
+
+fn state_of(contact: Option<Contact>, is_free: bool) -> TouchState {
+    match contact {
+        Some(_) => TouchState::Contact,
+        None if is_free => TouchState::Free,
+        None => TouchState::Light,
     }
 }
 
@@ -110,6 +129,7 @@ pub struct ContactEstimator {
     params: ContactEstimatorParams,
     compensator: Compensator,
     bias: Option<BiasTracker>,
+    free_motion: FreeMotion,
     gate: Option<ContactGate>,
     /// of the smoothed force
     ball_gate: Option<ContactGate>,
@@ -127,6 +147,7 @@ impl ContactEstimator {
         Ok(Self {
             compensator: Compensator::new(params.compensator)?,
             bias: params.bias.map(BiasTracker::new).transpose()?,
+            free_motion: FreeMotion::new(params.gate.unwrap_or_default().free),
             gate: params.gate.map(ContactGate::new).transpose()?,
             ball_gate: params.gate.map(ContactGate::new).transpose()?,
             motion: TipMotion::new(params.sliding.unwrap_or_default(), params.tip),
@@ -148,12 +169,21 @@ impl ContactEstimator {
     }
 
     fn decide(&mut self, mut tip: Tip, dt: f64) -> &ContactSample {
+        let free_motion = &mut self.free_motion;
+        let mut is_free = false;
         let bias_t = match &mut self.bias {
             Some(bias) => {
-                tip.force_o = bias.compensate(&tip);
+                let mut decide = |rest: &Vector3<f64>| {
+                    is_free = free_motion.update(rest, dt);
+                    is_free
+                };
+                tip.force_o = bias.compensate(&tip, &mut decide);
                 bias.bias_t()
             }
-            None => Vector3::zeros(),
+            None => {
+                is_free = free_motion.update(&tip.force_o, dt);
+                Vector3::zeros()
+            }
         };
         let ball = match self.params.sliding {
             Some(_) => self.motion.update(&tip, dt, LONGEST_HOLD),
@@ -176,7 +206,8 @@ impl ContactEstimator {
         };
         let reported = tip.pose_ot.translation.vector.into();
         let centre = self.params.tip.centre(&reported, &tip.force_o);
-        self.latest.insert(ContactSample { tip, dt, bias_t, centre, contact, ball, ball_contact, surface })
+        let is_free = is_free && contact.is_none();
+        self.latest.insert(ContactSample { tip, dt, bias_t, centre, contact, is_free, ball, ball_contact, surface })
     }
 
     /// The last sample that was taken; `None` before the first.

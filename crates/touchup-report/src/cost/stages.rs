@@ -94,7 +94,9 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
         TimedCase::each("compensation (nothing to take off)", &samples, |sample| {
             Ok(plain.compensate(black_box(sample)))
         }),
-        TimedCase::each("bias tracking", &tips, |tip| Ok(bias.compensate(tip))),
+        TimedCase::each("bias tracking", &tips, |tip| {
+            Ok(bias.compensate(tip, |rest| rest.norm() < scene.contact.unwrap_or_default().free))
+        }),
         TimedCase::each("contact gate", &tips, |tip| Ok(gate.update(tip.stamp_ns, &tip.force_o))),
         TimedCase::each("sliding and friction", &tips, |tip| {
             let ball = motion.update(tip, 1e-3, 0.03);

@@ -62,7 +62,7 @@ enum Reconstruction {
 
 impl Engine {
     /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no settings for it, it is followed by
-    /// those that [`BiasParams::below`] the contact threshold has, for patch and haptic update alike.
+    /// the default ones, for patch and haptic update alike.
     ///
     /// - `mesh`: the scan.
     /// - `patch`: `None`: the haptic update alone; `renewal` is of no use then.
@@ -76,7 +76,7 @@ impl Engine {
         renewal: Renewal,
     ) -> Result<Self, LiveError> {
         if patch.is_some() {
-            refine.bias = refine.bias.or(refine.gate.as_ref().map(BiasParams::below));
+            refine.bias = refine.bias.or(refine.gate.map(|_| BiasParams::default()));
         }
         let mut refiner = Refiner::new(mesh, refine)?;
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {

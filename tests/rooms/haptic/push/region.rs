@@ -63,6 +63,10 @@ fn vertices_outside_the_region_are_bit_equal_after_every_push() {
 fn carving_moves_the_corners_of_one_face() {
     let mut refiner = Refiner::new(bumpy(3), RefineParams::robust(BALL)).unwrap();
     let mut carved = 0;
+    // known to be free, well above
+    for tick in -100..0 {
+        refiner.push(&sample(tick, Point3::new(0.4e-3, 0.9e-3, 0.1), Vector3::zeros())).unwrap();
+    }
     for tick in 0..400 {
         let before = refiner.mesh().clone();
         let centre = Point3::new(0.4e-3 + 5e-6 * tick as f64, 0.9e-3, RADIUS - 0.3e-3);

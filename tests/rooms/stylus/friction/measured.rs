@@ -110,10 +110,10 @@ fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
             cone_cosine: Some(0.82),
             ..TouchFinderParams::new(BALL, None)
         };
-        let gate = ContactGateParams { on: 0.1, off: 0.05 };
+        let gate = ContactGateParams { on: 0.1, off: 0.05, free: 0.04 };
         let mut contacts = ContactEstimator::new(ContactEstimatorParams {
             compensator: CompensatorParams { wrench_frame: WrenchFrame::Object, ..CompensatorParams::default() },
-            bias: Some(BiasParams::below(&gate)),
+            bias: Some(BiasParams::default()),
             gate: Some(gate),
             ..ContactEstimatorParams::new(TipParams { radius: BALL, stiffness: None })
         })

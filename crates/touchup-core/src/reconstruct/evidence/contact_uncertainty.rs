@@ -57,21 +57,3 @@ pub struct ContactSigma {
     /// of the direction of the normal, rad
     pub normal: f64,
 }
-
-/// A running median of lengths.
-#[derive(Clone, Debug)]
-pub(in crate::reconstruct) struct RunningMedian {
-    pub length: f64,
-    /// what is never undercut
-    pub least: f64,
-}
-
-/// Share by which it moves: it converges within some hundred samples.
-const STEP: f64 = 0.01;
-
-impl RunningMedian {
-    /// Takes in a length that is larger than the median, or smaller.
-    pub(in crate::reconstruct) fn note(&mut self, is_larger: bool) {
-        self.length = (self.length * if is_larger { 1.0 + STEP } else { 1.0 - STEP }).max(self.least);
-    }
-}

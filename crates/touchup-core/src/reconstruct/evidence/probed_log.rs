@@ -134,13 +134,20 @@ impl ProbedLog {
 mod tests {
     use super::*;
     use crate::reconstruct::ContactSigma;
+    use crate::stylus::TouchState;
     use nalgebra::{Point3, Vector3};
 
     fn noted(log: &mut ProbedLog, ms: i64) {
         let (point, normal) = (Point3::new(ms as f64, 0.0, 0.0), Vector3::z());
         let stamp_ns = ms * 1_000_000;
         let contact = SurfaceContact { point, normal, weight: 1.0, stamp_ns, sigma: ContactSigma::default() };
-        let touch = TipTouch { stamp_ns, centre: point + normal * 1.5e-3, axis: normal, contact: Some(contact) };
+        let touch = TipTouch {
+            stamp_ns,
+            centre: point + normal * 1.5e-3,
+            axis: normal,
+            contact: Some(contact),
+            state: TouchState::Contact,
+        };
         log.note(&touch, &contact, Verdict::Taken);
     }
 
@@ -183,7 +190,7 @@ mod tests {
             let point = Point3::new(swings(t, 5.0), swings(t, 0.377), 0.5 * CELL);
             let contact = SurfaceContact { point, normal, weight: 1.0, stamp_ns, sigma: ContactSigma::default() };
             let centre = point + normal * 1.5e-3;
-            let touch = TipTouch { stamp_ns, centre, axis: normal, contact: Some(contact) };
+            let touch = TipTouch { stamp_ns, centre, axis: normal, contact: Some(contact), state: TouchState::Contact };
             log.note(&touch, &contact, Verdict::Taken);
             most = most.max(log.points().len());
         }

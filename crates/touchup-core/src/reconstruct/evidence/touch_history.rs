@@ -12,7 +12,7 @@ use crate::reconstruct::evidence::touches::TipTouch;
 use crate::reconstruct::field::grid::GridChanges;
 use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
-use crate::stylus::{STROKE_PAUSE_NS, TipPlace};
+use crate::stylus::{STROKE_PAUSE_NS, TipPlace, TouchState};
 
 /// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
@@ -50,8 +50,15 @@ impl TouchHistory {
     pub fn keep(&mut self, touch: &TipTouch) {
         self.until_ns = touch.stamp_ns;
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
-        let Some(contact) = &touch.contact else { return self.sweep(&place) };
-        if self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS) {
+        let is_between_strokes = self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS);
+        let Some(contact) = &touch.contact else {
+            // a firm touch of which no contact is known belongs to the stroke that it is in
+            if touch.state == TouchState::Free || touch.state == TouchState::Contact && !is_between_strokes {
+                self.sweep(&place);
+            }
+            return;
+        };
+        if is_between_strokes {
             self.contacts.begin_stroke();
             self.free_space.begin_stroke();
             self.probed.begin_stroke();

@@ -8,10 +8,11 @@ use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma, RunningMedian};
+use crate::numeric::RunningMedian;
+use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma};
 use crate::stylus::{
-    ContactSample, Friction, FrictionCoefficient, LocalMotion, NormalEstimate, SettingError, Sliding, SmoothedMotion,
-    TipBody, TipContact, TipPlace, TipShape, WIDEST_CONE_COSINE,
+    ContactSample, ForceNoise, Friction, FrictionCoefficient, LocalMotion, NormalEstimate, SettingError, Sliding,
+    SmoothedMotion, TipBody, TipContact, TipPlace, TipShape, TouchState, WIDEST_CONE_COSINE,
 };
 
 /// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces take for smooth.
@@ -79,6 +80,8 @@ pub struct TipTouch {
     pub axis: Vector3<f64>,
     /// `None` in free motion, and where it is not known which point of the tip touches
     pub contact: Option<SurfaceContact>,
+    /// what the force says
+    pub state: TouchState,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +90,13 @@ struct WindowEntry {
     centre: Point3<f64>,
     axis: Vector3<f64>,
     force_o: Vector3<f64>,
-    in_contact: bool,
+    state: TouchState,
+}
+
+impl WindowEntry {
+    fn is_in_contact(&self) -> bool {
+        self.state == TouchState::Contact
+    }
 }
 
 /// Finds touches in a stream of samples.
@@ -98,8 +107,8 @@ pub struct TouchFinder {
     friction: Option<Friction>,
     /// of the positions: of the distances from short pieces of the path to their parabolas, m
     noise: RunningMedian,
-    /// of the steps of the force from one sample to the next, N
-    shake: RunningMedian,
+    /// of the force
+    force_noise: ForceNoise,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<WindowEntry>,
     /// the first of `held` whose touch has not been given out
@@ -115,7 +124,7 @@ impl TouchFinder {
             params,
             friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
             noise: RunningMedian { length: USUAL_NOISE, least: LEAST_NOISE },
-            shake: RunningMedian { length: USUAL_SHAKE, least: LEAST_SHAKE },
+            force_noise: ForceNoise::new(),
             held: VecDeque::new(),
             next: 0,
         })
@@ -128,15 +137,14 @@ impl TouchFinder {
             self.flush(&mut each);
         }
         if let Some(last) = self.held.back() {
-            let step_squared = (tip.force_o - last.force_o).norm_squared();
-            self.shake.note(step_squared > self.shake.length * self.shake.length);
+            self.force_noise.note(&last.force_o, &tip.force_o);
         }
         self.held.push_back(WindowEntry {
             stamp_ns: tip.stamp_ns,
             centre: sample.centre,
             axis: TipPlace::from(&tip.pose_ot).axis,
             force_o: tip.force_o,
-            in_contact: sample.is_in_contact(),
+            state: sample.state(),
         });
         while self.held[self.next].stamp_ns + self.params.half_window_ns <= tip.stamp_ns {
             each(self.touch(self.next));
@@ -179,7 +187,7 @@ impl TouchFinder {
         };
         let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
         let mut contact = None;
-        if window.is_alike && self.held[at].in_contact {
+        if window.is_alike && self.held[at].is_in_contact() {
             let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
             let normal = match &mut self.friction {
                 Some(friction) => {
@@ -192,7 +200,8 @@ impl TouchFinder {
         } else {
             self.lift();
         }
-        TipTouch { stamp_ns: self.held[at].stamp_ns, centre: place.centre, axis: place.axis, contact }
+        let WindowEntry { stamp_ns, axis, state, .. } = self.held[at];
+        TipTouch { stamp_ns, centre: place.centre, axis, contact, state }
     }
 
     /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
@@ -240,7 +249,7 @@ impl TouchFinder {
         let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
             weight /= 1.0 + self.roughness(motion);
             let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
-            let both = [self.noise.length, self.shake.length / STEP_PER_SIGMA * softness];
+            let both = [self.noise.length, self.force_noise.sigma() * softness];
             let [pose, force] = both.map(|noise| noise * motion.centre_gain.sqrt());
             let bend = force_o.dot(&normal) * softness;
             ContactSigma {
@@ -270,12 +279,6 @@ const SHARED_POSE: f64 = 1.65;
 const LEAST_NOISE: f64 = 1e-6;
 /// … and where it starts, m.
 const USUAL_NOISE: f64 = 0.03e-3;
-/// Lower bound of the steps of the force, N.
-const LEAST_SHAKE: f64 = 1e-4;
-/// … and where they start, N.
-const USUAL_SHAKE: f64 = 0.1;
-/// Median length of the difference of two vectors of unit noise per axis: √2 times that of χ with three degrees.
-const STEP_PER_SIGMA: f64 = 2.175;
 
 /// The samples around one.
 #[derive(Clone, Debug)]
@@ -312,6 +315,6 @@ impl Window {
     fn add(&mut self, entry: &WindowEntry, middle: &WindowEntry) {
         self.sums.add((entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9, &entry.centre);
         self.force += entry.force_o;
-        self.is_alike &= entry.in_contact == middle.in_contact;
+        self.is_alike &= entry.is_in_contact() == middle.is_in_contact();
     }
 }
