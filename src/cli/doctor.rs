@@ -1,7 +1,7 @@
 //! `touchup doctor`: what is wrong with a recording, before anything is made of it.
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
@@ -10,11 +10,11 @@ use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report, require};
 use crate::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
 use crate::io::mesh_file::{MeshUnit, read_mesh};
-use crate::io::recording::Topics;
+use crate::io::recording::{StampSource, Topics};
 use crate::mesh::FaceTree;
 use crate::replay::{Recording, each_sample, marker_filter};
-use crate::scene::Scene;
-use crate::stylus::{ContactEstimator, ContactEstimatorParams};
+use crate::scene::{Mode, Scene};
+use crate::stylus::{ContactEstimator, ContactEstimatorParams, WrenchFrame};
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
@@ -39,6 +39,9 @@ pub(super) struct DoctorArguments {
     /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose
     #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
     markers_topic: Option<String>,
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    #[arg(long, value_name = "S", default_value = "header")]
+    stamp: StampSource,
     /// Radius of the ball, mm; needed where no scene names it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
@@ -59,7 +62,11 @@ struct Diagnosis {
     findings: Vec<InputFinding>,
 }
 
-const NO_RADIUS: &str = "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene";
+/// Kind and exit code of an input that is not to be used.
+pub(super) const UNSOUND: (&str, u8) = ("input", 3);
+
+pub(super) const NO_RADIUS: &str =
+    "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene";
 
 /// The command: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
@@ -68,29 +75,20 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
-    let recording = Recording::open(&arguments.recording, &topics)?;
-    let tip = scene.tip_params();
-    let compensator = scene.compensator_params(recording.wrench_frame);
-    let contact = ContactEstimatorParams {
-        compensator,
-        gate: Some(scene.contact.unwrap_or_default()),
-        ..ContactEstimatorParams::new(tip)
-    };
-    let params = InputMonitorParams {
-        compensator,
-        tip,
-        shape: scene.tip_shape(),
-        scan_noise: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise),
-        contact_on: contact.gate.map(|gate| gate.on),
-        sync: scene.sync_params(),
-    };
+    let recording = Recording::open(&arguments.recording, &topics, arguments.stamp)?;
+    let params = input_monitor_params(&scene, recording.wrench_frame);
     let monitor = RefCell::new(InputMonitor::new(params)?);
+    let contact = ContactEstimatorParams {
+        compensator: params.compensator,
+        gate: Some(scene.contact.unwrap_or_default()),
+        ..ContactEstimatorParams::new(params.tip)
+    };
     let mut estimator = ContactEstimator::new(contact)?;
     let mut progress = WorkProgress::new("replay", recording.message_count());
     let replayed = each_sample(
         recording,
         scene.placement(),
-        params.sync,
+        scene.sync_params(),
         markers,
         &mut || progress.step(),
         &mut |message| monitor.borrow_mut().message(message),
@@ -109,9 +107,36 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
         let lines = diagnosis.findings.iter().map(ToString::to_string).collect::<Vec<_>>();
         if lines.is_empty() { "nothing speaks against scan and recording".to_owned() } else { lines.join("\n") }
     })?;
-    match diagnosis.findings.first() {
-        Some(first) if first.is_sure => Err(CliError::new(("input", 3), first, None)),
-        _ => Ok(replayed.losses),
+    refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
+    Ok(replayed.losses)
+}
+
+/// What the scene says of the input.
+pub(super) fn input_monitor_params(scene: &Scene, wrench_frame: WrenchFrame) -> InputMonitorParams {
+    let has_gate = scene.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust);
+    InputMonitorParams {
+        compensator: scene.compensator_params(wrench_frame),
+        tip: scene.tip_params(),
+        shape: scene.tip_shape(),
+        scan_noise: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise),
+        contact_on: has_gate.then(|| scene.contact.unwrap_or_default().on),
+        sync: scene.sync_params(),
+    }
+}
+
+/// Refuses an input of which something is surely wrong.
+///
+/// - `scan`, `recording`: to be named.
+///
+/// # Errors
+/// The first that is.
+pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
+    match findings.iter().find(|finding| finding.is_sure) {
+        Some(finding) => {
+            let input = format!("{} on {}", recording.display(), scan.display());
+            Err(CliError::new(UNSOUND, format!("{input}: {finding}"), None))
+        }
+        None => Ok(()),
     }
 }
 

@@ -59,6 +59,7 @@ impl CliError {
             _ if of_system.any(|cause| cause.kind() == ErrorKind::NotFound) => {
                 Some("check the path: no file is there; a relative path begins at the present folder")
             }
+            "input" => Some("touchup doctor SCAN RECORDING says more; --force writes a result all the same"),
             "stopped" => Some("look at the arm and at what is around it; a protective stop is released at its panel"),
             "scene" => Some("config/touchup.yaml lists every parameter with its unit and range"),
             _ => None,
@@ -189,6 +190,7 @@ errors_of_rooms! {
     OutcomeError => |error| match error {
         OutcomeError::WriteMesh(_) => NOT_WRITTEN,
         OutcomeError::ReadMesh(_) | OutcomeError::Mesh(_) => ("mesh", 3),
+        OutcomeError::Unchanged => ("input", 3),
         OutcomeError::Touches(error) => of_touches(error),
         OutcomeError::Features(error) => of_features(error),
     }, "";

@@ -1,5 +1,6 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,20 +11,22 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
+use super::doctor::{NO_RADIUS, UNSOUND, input_monitor_params, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
-use crate::haptic::{RefineCounts, RefineError, RefineParams, Refiner};
+use crate::diagnose::{InputFinding, InputMonitor};
+use crate::haptic::{RefineError, Refiner};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
-use crate::io::recording::Topics;
+use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, Quantiles};
-use crate::mesh::{FaceTree, RepairReport};
+use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
-use crate::stylus::{ClockEstimator, ContactEstimator, MarkerCounts, Sample};
+use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
@@ -52,9 +55,12 @@ pub(super) struct RefineArguments {
     /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
     #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
     markers_topic: Option<String>,
-    /// Radius of the ball, mm
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    #[arg(long, value_name = "S", default_value = "header")]
+    stamp: StampSource,
+    /// Radius of the ball, mm; needed where no scene names the tip
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    tip_radius_mm: Option<f64>,
+    pub tip_radius_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     stiffness_n_per_mm: Option<f64>,
@@ -81,6 +87,9 @@ pub(super) struct RefineArguments {
     /// features.json and touches.csv there unless they have places of their own
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "markers_topic"])]
     resume: Option<PathBuf>,
+    /// Refines also where something of the recording is surely wrong (`touchup doctor`)
+    #[arg(long)]
+    pub force: bool,
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
@@ -100,16 +109,18 @@ fn path_or_none() -> impl TypedValueParser<Value = PathBuf> {
 reported! {
     /// What `--json` prints; times in s, `push_ns` in ns.
     pub(super) struct RefineSummary, fn of(
-        cost: SceneCost,
+        run: (SceneCost, [f64; 2], Option<LiveSummary>),
         replayed: &Replayed,
         pushes: Pushes,
         refiner: &Refiner,
         outcome: Outcome,
-        offsets: (Option<WrenchOffset>, Option<ScanOffset>),
-        timing: ([f64; 2], Option<LiveSummary>)
+        input: (ToldNumbers, Vec<InputFinding>),
+        offsets: (Option<WrenchOffset>, Option<ScanOffset>)
     ) {
         /// stages built from the scene, those left out, and the memory at start
-        scene: SceneCost = cost,
+        scene: SceneCost = run.0,
+        /// what was told of tip and scan, and by what
+        told: ToldNumbers = input.0,
         /// wrenches of the recording: each could be a sample
         samples: u64 = replayed.wrenches,
         /// those that the refiner took
@@ -124,6 +135,8 @@ reported! {
         wrench_offset?: WrenchOffset = offsets.0,
         /// rigid offset of the scan from the part, with --registration
         registration?: ScanOffset = offsets.1,
+        /// what is doubtful about the recording, the surest first (`touchup doctor`)
+        findings: Vec<InputFinding> = input.1,
         /// faces that are not where the scan had them
         moved_faces: u64 = outcome.moved_faces,
         /// updates made smaller because a face would have folded
@@ -132,15 +145,44 @@ reported! {
         friction: Option<FrictionFound> = refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
         /// of one sample through the whole chain
         push_ns: Quantiles = pushes.latencies.quantiles(),
-        load_s: f64 = timing.0[0],
-        replay_s: f64 = timing.0[1],
+        load_s: f64 = run.1[0],
+        replay_s: f64 = run.1[1],
         /// of the patch beside the samples, with --live
-        live?: LiveSummary = timing.1,
+        live?: LiveSummary = run.2,
         /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
         patch: Option<PatchSummary> = outcome.patch,
         /// how well that is known; not there when the scene has no `uncertainty`
         uncertainty?: UncertaintySummary = outcome.uncertainty,
     }
+}
+
+/// A number that the result depends on.
+#[derive(Clone, Debug, Serialize)]
+struct ToldNumber {
+    value: f64,
+    source: ToldBy,
+}
+
+touchup_core::names! {
+    /// Where a number comes from.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum ToldBy {
+        /// a flag
+        Flag = "flag",
+        /// the scene
+        Scene = "scene",
+        /// nobody: that of a usual cell
+        Default = "default",
+    }
+}
+
+/// What was told of tip and scan; of a rigid tip no stiffness.
+#[derive(Clone, Debug, Serialize)]
+struct ToldNumbers {
+    tip_radius_mm: ToldNumber,
+    stiffness_n_per_mm: Option<ToldNumber>,
+    scan_noise_mm: ToldNumber,
 }
 
 /// Coefficient of kinetic friction and its standard error.
@@ -205,41 +247,6 @@ fn reason_of(error: &RefineError) -> &'static str {
     }
 }
 
-/// Hint for a recording without a single sample, where no fault of single messages explains it.
-fn lost_samples(replayed: &Replayed, accepted: u64) -> Option<String> {
-    (accepted == 0 && replayed.losses.is_empty()).then(|| {
-        format!(
-            "no sample came of {}: each needs a pose shortly before and after it by the same clock \
-             (sync.wrench_offset_ms, sync.largest_gap_ms)",
-            counted(replayed.wrenches, "wrench", "wrenches")
-        )
-    })
-}
-
-/// Contacts that were mostly where there is no mesh.
-fn lost_contacts(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
-    (params.gate.is_some() && counts.out_of_reach > counts.moved).then(|| {
-        format!(
-            "{} in contact where the scan has no face near: are the poses in its frame, and is --mesh-unit right?",
-            counted(counts.out_of_reach, "sample is", "samples are")
-        )
-    })
-}
-
-/// A hint that touches and scan may not fit, where most updates could not be made in full.
-///
-/// On scans as bad as 1 mm a quarter is cut back at most; on one taken for inches it is nineteen of twenty. A mesh with
-/// triangles long and thin from the start comes here too, so it is no loss.
-fn misfit(params: &RefineParams, counts: &RefineCounts) -> Option<String> {
-    (params.gate.is_some() && counts.cut_back > counts.moved / 2).then(|| {
-        format!(
-            "{} of {} updates were cut back because a face would have folded: is --mesh-unit right, and are the poses in \
-             the frame of the scan?",
-            counts.cut_back, counts.moved
-        )
-    })
-}
-
 impl RefineArguments {
     /// Writes refined.ply, features.json and touches.csv into a folder.
     pub(super) fn in_folder(
@@ -278,7 +285,7 @@ impl RefineArguments {
 
     /// Reads, replays and writes.
     pub(super) fn refined(&self) -> Result<Refined, CliError> {
-        let scene = self.scene()?;
+        let (scene, told) = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
         let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit)?;
@@ -287,8 +294,9 @@ impl RefineArguments {
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        let recording = Recording::open(&self.bag, &topics)?;
-        let params = scene.refine_params(recording.wrench_frame).ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
+        let recording = Recording::open(&self.bag, &topics, self.stamp)?;
+        let recording_frame = recording.wrench_frame;
+        let params = scene.refine_params(recording_frame).ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
         let params = cut.refine_params(params);
         let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
         require(patch.is_some() || !self.live, NO_PATCH)?;
@@ -308,7 +316,7 @@ impl RefineArguments {
                 rates.change_strokes(change.is_undo);
             }
         };
-        let mut clock = scene.clock.as_ref().map(|_| ClockEstimator::new(scene.tip_params().stiffness)).transpose()?;
+        let monitor = RefCell::new(InputMonitor::new(input_monitor_params(&scene, recording_frame))?);
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         // an update that takes every sample for contact says nothing about contact
         let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
@@ -319,7 +327,7 @@ impl RefineArguments {
             scene.sync_params(),
             markers,
             &mut || progress.step(),
-            &mut |_| (),
+            &mut |message| monitor.borrow_mut().message(message),
             |sample| {
                 change_strokes(sample.stamp_ns, &mut rates);
                 pushes.push(&mut rates, sample);
@@ -327,8 +335,10 @@ impl RefineArguments {
                     Some(observer) => observer.observe(sample).ok(),
                     None => rates.engine.refiner().contact(),
                 };
-                if let (Some(clock), Some(contact)) = (&mut clock, contact) {
-                    clock.push(contact);
+                let mut monitor = monitor.borrow_mut();
+                monitor.sample(sample);
+                if let Some(contact) = contact {
+                    monitor.contact(contact);
                 }
                 if let (Some(contacts), Some(contact)) = (&mut contacts, contact) {
                     contacts.push(contact);
@@ -336,8 +346,11 @@ impl RefineArguments {
             },
         )?;
         change_strokes(i64::MAX, &mut rates);
-        let registration = contacts
-            .map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &FaceTree::new(&as_scanned))));
+        let monitor = monitor.into_inner();
+        let tree = FaceTree::new(&as_scanned);
+        let findings = self.doubt(&monitor, &as_scanned, &tree, pushes.accepted)?;
+        let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &tree)));
+        drop(tree);
         let (refiner, patcher, live) = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let counts = refiner.counts();
@@ -349,30 +362,43 @@ impl RefineArguments {
             features: self.features_out.as_deref(),
             touches: self.touches_out.as_deref(),
             outside: cut.outside.as_ref(),
+            must_change: !self.force,
         };
         let outcome = places.write(&as_scanned, refiner.mesh(), patcher)?;
         drop(stage);
         debug!(?counts, "replayed");
-        replayed.losses.extend(lost_samples(&replayed, pushes.accepted));
-        replayed.losses.extend(lost_contacts(&params, counts));
-        // a mesh that waits for its patch folds more often
-        let was_late = live.as_ref().is_some_and(|live| live.late > 0);
-        if let Some(misfit) = misfit(&params, counts).filter(|_| !was_late) {
-            warn!("{misfit}");
-        }
-        if params.gate.is_some() && pushes.accepted > 0 && counts.contacts == 0 {
-            warn!("the stylus never came into contact: no force was above contact.on_n, so the mesh is as scanned");
-        }
         pushes.refused.extend(std::mem::take(&mut replayed.refused));
         if counts.outside_region > 0 {
             pushes.refused.insert("outside_region".to_owned(), counts.outside_region);
         }
-        let wrench_offset = clock
-            .and_then(|clock| clock.offset())
+        let wrench_offset = monitor
+            .clock_offset()
+            .filter(|_| scene.clock.is_some())
             .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns));
-        let (offsets, timing) = ((wrench_offset, registration), ([load_s, replay_s], live));
-        let summary = RefineSummary::of(cost, &replayed, pushes, &refiner, outcome, offsets, timing);
+        let (run, input) = ((cost, [load_s, replay_s], live), (told, findings));
+        let offsets = (wrench_offset, registration);
+        let summary = RefineSummary::of(run, &replayed, pushes, &refiner, outcome, input, offsets);
         Ok(Refined { repair, summary, losses: replayed.losses })
+    }
+
+    /// Warns of what is doubtful, and refuses what is surely wrong before anything is written.
+    fn doubt(
+        &self,
+        monitor: &InputMonitor,
+        scan: &TriMesh,
+        tree: &FaceTree,
+        accepted: u64,
+    ) -> Result<Vec<InputFinding>, CliError> {
+        let findings = monitor.findings(scan, tree);
+        if !self.force {
+            refuse_unsound(&findings, &self.scan, &self.bag)?;
+            if accepted == 0 {
+                let why = format!("{}: no sample of it could be used", self.bag.display());
+                return Err(CliError::new(UNSOUND, why, None));
+            }
+        }
+        findings.iter().for_each(|finding| warn!("{finding}"));
+        Ok(findings)
     }
 
     /// The stages built from the scene for these samples.
@@ -415,9 +441,19 @@ impl RefineArguments {
         Ok(())
     }
 
-    /// The scene with the flags over it.
-    fn scene(&self) -> Result<Scene, CliError> {
-        let mut scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+    /// The scene with the flags over it, and by what its numbers are told.
+    fn scene(&self) -> Result<(Scene, ToldNumbers), CliError> {
+        let (mut scene, yaml) = match &self.scene {
+            Some(path) => Scene::read_with_text(path)?,
+            None => (Scene::default(), String::new()),
+        };
+        let told_by = |flag: Option<f64>, section: &str, key: &str| match flag {
+            Some(_) => ToldBy::Flag,
+            None if Scene::names(&yaml, section, key) => ToldBy::Scene,
+            None => ToldBy::Default,
+        };
+        let radius_by = told_by(self.tip_radius_mm, "tip", "radius_mm");
+        require(radius_by != ToldBy::Default, NO_RADIUS)?;
         if let Some(radius_mm) = self.tip_radius_mm {
             scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
         }
@@ -432,7 +468,30 @@ impl RefineArguments {
         }
         // the file was in range when it was read: what is not now came by a flag
         scene.validate().map_err(CliError::usage)?;
-        Ok(scene)
+        let stiffness_by = told_by(self.stiffness_n_per_mm, "tip", "stiffness_n_per_mm");
+        let noise_by = told_by(self.scan_noise_mm, "scan", "noise_mm");
+        let tip = scene.tip_params();
+        let told = ToldNumbers {
+            tip_radius_mm: ToldNumber { value: tip.radius * 1e3, source: radius_by },
+            stiffness_n_per_mm: tip.stiffness.map(|k| ToldNumber { value: k / 1e3, source: stiffness_by }),
+            scan_noise_mm: ToldNumber {
+                value: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise) * 1e3,
+                source: noise_by,
+            },
+        };
+        Ok((scene, told))
+    }
+}
+
+impl fmt::Display for ToldNumbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { tip_radius_mm: radius, stiffness_n_per_mm: stiffness, scan_noise_mm: noise } = self;
+        write!(f, "tip: radius {:.4} mm ({}), ", radius.value, radius.source)?;
+        match stiffness {
+            Some(stiffness) => write!(f, "stiffness {:.4} N/mm ({})", stiffness.value, stiffness.source)?,
+            None => write!(f, "rigid")?,
+        }
+        write!(f, "; scan: noise {:.3} mm ({})", noise.value, noise.source)
     }
 }
 
@@ -471,7 +530,7 @@ impl RefineSummary {
 /// The verdict, then further results.
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.verdict())?;
+        write!(f, "{}\n{}", self.verdict(), self.told)?;
         let last_outlier = self.uncertainty.as_ref().and_then(UncertaintySummary::last_outlier);
         last_outlier.iter().try_for_each(|last| write!(f, "\n{last}"))?;
         let friction = &self.friction;

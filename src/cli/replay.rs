@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::progress::WorkProgress;
 use super::{CliError, Losses, counted, notify, print_report};
-use crate::io::recording::Topics;
+use crate::io::recording::{StampSource, Topics};
 use crate::replay::{Recording, each_message, marker_filter};
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
@@ -83,7 +83,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
-    let recording = Recording::open(&arguments.recording, &topics)?;
+    let recording = Recording::open(&arguments.recording, &topics, StampSource::Header)?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 

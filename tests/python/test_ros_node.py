@@ -55,9 +55,10 @@ def domain():
 
 def scene_for(demo_folder, folder):
     """A scene that names the scan of the demo, as config/demo.yaml does."""
-    parts = ["sync", "clock", "contact", "tip", "sliding", "carve", "guard", "patch", "uncertainty", "refine"]
+    parts = ["sync", "clock", "contact", "sliding", "carve", "guard", "patch", "uncertainty", "refine"]
+    named = f"tip:\n  radius_mm: 1.5\nscan:\n  file: {demo_folder / 'scan.ply'}\n  unit: mm\n"
     scene = folder / "scene.yaml"
-    scene.write_text("".join(f"{part}:\n" for part in parts) + f"scan:\n  file: {demo_folder / 'scan.ply'}\n  unit: mm\n")
+    scene.write_text("".join(f"{part}:\n" for part in parts) + named)
     return scene
 
 

@@ -83,8 +83,13 @@ impl Case {
         write_recording(&self.path(name), &Topics::default(), "object", wrench_frame, messages).unwrap();
     }
 
-    /// `touchup refine` of `scan.ply` by `bag` into `out`, with further flags.
+    /// `touchup refine` of `scan.ply` by `bag` into `out`, with the radius of the ball and further flags.
     fn refine(&self, bag: &str, out: &str, flags: &[&str]) -> Output {
+        self.refine_untold(bag, out, &[flags, &["--tip-radius-mm", "1.5"]].concat())
+    }
+
+    /// The same without the radius.
+    fn refine_untold(&self, bag: &str, out: &str, flags: &[&str]) -> Output {
         let [scan, bag, out] = ["scan.ply", bag, out].map(|name| self.path(name).to_str().unwrap().to_owned());
         touchup(&[&["refine", "--scan", &scan, "--bag", &bag, "--out", &out], flags].concat(), "")
     }
@@ -170,6 +175,8 @@ fn refine_json_is_one_object_with_the_documented_keys() {
         "contacts",
         "moved_faces",
         "cut_back",
+        "findings",
+        "told",
         "friction",
         "push_ns",
         "load_s",
@@ -303,15 +310,18 @@ fn a_topic_that_begins_late_loses_no_message() {
 #[test]
 fn flags_go_over_the_scene() {
     let case = Case::new();
-    fs::write(case.path("scene.yaml"), "sync:\ncontact: { on_n: 3 }\ntip:\nrefine:\n").unwrap();
+    fs::write(case.path("scene.yaml"), "sync:\ncontact: { on_n: 3 }\ntip: { radius_mm: 1.5 }\nrefine:\n").unwrap();
     let scene = case.path("scene.yaml");
     let flags = ["--json", "--scene", scene.to_str().unwrap()];
-    let untouched = json(&case.refine("touch.mcap", "out.ply", &flags));
+    let light = case.refine("touch.mcap", "out.ply", &flags);
+    assert!(code(&light) == 3 && text(&light.stderr).contains("contact.on_n is 3.00 N"), "{}", text(&light.stderr));
+    let untouched = json(&case.refine("touch.mcap", "out.ply", &[&flags[..], &["--force"]].concat()));
     assert_eq!((&untouched["contacts"], &untouched["moved_faces"]), (&Value::from(0), &Value::from(0)), "2 N < 3 N");
     let paper = json(&case.refine("touch.mcap", "out.ply", &[&flags[..], &["--mode", "paper"]].concat()));
     assert!(paper["moved_faces"].as_u64().unwrap() > 0, "the paper has no gate");
-    let large = json(&case.refine("touch.mcap", "out.ply", &["--json", "--tip-radius-mm", "9"]));
-    let small = json(&case.refine("touch.mcap", "out.ply", &["--json"]));
+    let [large, small] = ["9", "1.5"].map(|radius| {
+        json(&case.refine_untold("touch.mcap", "out.ply", &["--json", "--force", "--tip-radius-mm", radius]))
+    });
     assert_ne!(large["moved_faces"], small["moved_faces"]);
 }
 
@@ -326,10 +336,14 @@ fn wrong_flags_are_2_before_anything_is_read() {
         (&["--scan-noise-mm", "nan"], "scan.noise_mm"),
     ];
     for (flags, named) in bad {
-        let output = case.refine("touch.mcap", "out.ply", flags);
+        let told = ["--tip-radius-mm=1.5"];
+        let told = if flags[0].starts_with("--tip") { &[] } else { &told[..] };
+        let output = case.refine_untold("touch.mcap", "out.ply", &[flags, told].concat());
         assert_eq!((code(&output), text(&output.stdout)), (2, ""), "{flags:?}");
         assert!(text(&output.stderr).contains(named), "{flags:?}: {}", text(&output.stderr));
     }
+    let untold = case.refine_untold("touch.mcap", "out.ply", &[]);
+    assert!(code(&untold) == 2 && text(&untold.stderr).contains("--tip-radius-mm"), "{}", text(&untold.stderr));
     assert_eq!(code(&case.refine("touch.mcap", "out.txt", &[])), 2);
     let (scan, over) = (case.bytes("scan.ply"), case.refine("touch.mcap", "./scan.ply", &[]));
     assert!(code(&over) == 2 && text(&over.stderr).contains("scan.ply, which --scan reads"), "{}", text(&over.stderr));
@@ -404,26 +418,29 @@ fn a_recording_that_moves_nothing_reports_the_reason() {
         messages.iter_mut().for_each(change);
         case.record(name, "stylus", &messages);
         let output = case.refine(name, "out.ply", &["--json"]);
-        assert_eq!(json(&output)["moved_faces"], 0, "{name}");
-        (code(&output), text(&output.stderr).to_owned())
+        assert!((code(&output), text(&output.stdout)) == (3, "") && !case.path("out.ply").exists(), "{name}");
+        let forced = case.refine(name, "forced.ply", &["--json", "--force"]);
+        assert_eq!(json(&forced)["moved_faces"], 0, "{name}: {}", text(&forced.stderr));
+        let error: Value = serde_json::from_slice(&output.stderr).expect("one object");
+        error["message"].as_str().unwrap().to_owned()
     };
-    let (exit, message) = changed("clock.mcap", &|message| {
+    let message = changed("clock.mcap", &|message| {
         if let Message::Wrench(wrench) = message {
             wrench.stamp_ns += 60_000_000_000;
         }
     });
-    assert!(exit == 4 && message.contains("no sample came of 1001 wrenches") && message.contains("clock"), "{message}");
-    let (exit, message) = changed("frame.mcap", &|message| {
+    assert!(message.contains("60") && message.contains("clock"), "{message}");
+    let message = changed("frame.mcap", &|message| {
         if let Message::Pose(pose) = message {
             pose.pose_ot.translation.x += 1.0;
         }
     });
-    assert!(exit == 4 && message.contains("the scan has no face near") && message.contains("--mesh-unit"), "{message}");
-    let (exit, message) = changed("air.mcap", &|message| match message {
+    assert!(message.contains("off the scan") && message.contains("scan_to_space"), "{message}");
+    let message = changed("air.mcap", &|message| match message {
         Message::Pose(pose) => pose.pose_ot.translation.z += 0.1,
         Message::Wrench(wrench) => wrench.wrench.force /= 10.0,
     });
-    assert!(exit == 0 && message.contains("contact.on_n") && message.lines().count() == 1, "{message}");
+    assert!(message.contains("contact.on_n") && message.lines().count() == 1, "{message}");
 }
 
 // ---- demo -------------------------------------------------------------------------------------------------------
@@ -477,7 +494,7 @@ fn simulated_markers_refine_the_scan() {
     let made = touchup(&["simulate", "--truth", &path("part.ply"), "--out", &path("made"), "--markers"], "");
     assert_eq!(code(&made), 0, "{}", text(&made.stderr));
     let (scan, bag, out) = (path("made/scan.ply"), path("made/touch.mcap"), path("out.ply"));
-    let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--json"];
+    let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--tip-radius-mm", "1.5", "--json"];
     let with = |more: &[&str]| touchup(&[&refine[..], more].concat(), "");
     let nowhere = with(&["--markers-topic", "/stylus/markers"]);
     assert_eq!(code(&nowhere), 2);
@@ -525,17 +542,16 @@ fn simulate_makes_the_input_of_refine() {
     let output = touchup(&part, "");
     assert_eq!((code(&output), text(&output.stderr)), (0, ""));
     let [scan, bag, out] = ["made/scan.ply", "made/touch.mcap", "refined.ply"].map(path);
-    let output = touchup(&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--json"], "");
+    let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--tip-radius-mm", "1.5"];
+    let output = touchup(&[&refine[..], &["--json"]].concat(), "");
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let summary = json(&output);
     assert!(summary["moved_faces"].as_u64().unwrap() > 100 && summary["contacts"].as_u64().unwrap() > 0, "{summary}");
     // the scan is in mm: 25 times as large it is a plausible part that has nothing to do with the touches
-    let output = touchup(&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--mesh-unit", "inch"], "");
+    fs::remove_file(&out).unwrap();
+    let output = touchup(&[&refine[..], &["--mesh-unit", "inch"]].concat(), "");
     let message = text(&output.stderr);
-    assert!(
-        code(&output) == 0 && message.contains("updates were cut back") && message.contains("--mesh-unit"),
-        "{message}"
-    );
+    assert!(code(&output) == 3 && message.contains("--mesh-unit") && !Path::new(&out).exists(), "{message}");
 
     for flags in [
         ["--friction", "-1"],

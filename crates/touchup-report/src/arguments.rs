@@ -10,7 +10,7 @@ use clap::{Parser, ValueEnum};
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
-use touchup_io::recording::Topics;
+use touchup_io::recording::{StampSource, Topics};
 use touchup_report::document::Report;
 use touchup_report::error::MeasureError;
 use touchup_report::files::ReportError;
@@ -204,7 +204,7 @@ impl ReportArguments {
     fn given(&self) -> Result<Option<GivenPart>, CommandError> {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
         let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-        let recording = Recording::open(bag, &Topics::default()).map_err(ReplayError::from)?;
+        let recording = Recording::open(bag, &Topics::default(), StampSource::Header).map_err(ReplayError::from)?;
         let no_refine = || CommandError::Usage("the scene names no `refine`: add `refine:` to it".to_owned());
         let params = scene.refine_params(recording.wrench_frame).ok_or_else(no_refine)?;
         let mut samples = Vec::new();

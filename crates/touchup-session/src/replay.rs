@@ -7,7 +7,7 @@ use touchup_core::numeric::counted;
 use touchup_core::stylus::{
     MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
 };
-use touchup_io::recording::{Record, RecordingError, RecordingReader, Topics};
+use touchup_io::recording::{Record, RecordingError, RecordingReader, StampSource, Topics};
 
 use crate::scene::Scene;
 
@@ -58,8 +58,8 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError`] of opening it.
-    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
-        let mut reader = RecordingReader::open(path, topics)?;
+    pub fn open(path: &Path, topics: &Topics, stamps: StampSource) -> Result<Self, RecordingError> {
+        let mut reader = RecordingReader::open(path, topics)?.stamped_by(stamps);
         let mut ahead = VecDeque::new();
         while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
             let Some(record) = reader.next_record() else { break };

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cli::CliError;
 use crate::cli::progress::WorkProgress;
-use crate::io::recording::Topics;
+use crate::io::recording::{StampSource, Topics};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::scene::Scene;
 use crate::stylus::{Placement, Sample};
@@ -29,7 +29,7 @@ impl CalibrationRecording {
     pub fn open(&self, bag: &Path) -> Result<Recording, CliError> {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        Ok(Recording::open(bag, &topics)?)
+        Ok(Recording::open(bag, &topics, StampSource::Header)?)
     }
 
     /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it

@@ -133,7 +133,9 @@ impl Probing<'_> {
         }
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let bag = self.out.join(RECORDING);
-        let arguments = RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
+        let mut arguments = RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
+        // what the arm has touched is written, whatever is said of it
+        arguments.force = true;
         let Refined { summary: refine, mut losses, .. } = arguments.refined()?;
         losses.extend(features.iter().filter_map(ProbedRecord::loss));
         let not_begun = self.flags.len() - features.len();

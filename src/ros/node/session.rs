@@ -272,7 +272,7 @@ impl ResultFiles {
     ) -> Result<Outcome, Box<OutcomeError>> {
         let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
         let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
-        let places = OutcomePlaces { mesh: &self.mesh, unit, features, touches, outside };
+        let places = OutcomePlaces { mesh: &self.mesh, unit, features, touches, outside, must_change: false };
         Ok(places.write(&setup.scan.0, refined, patcher)?)
     }
 }

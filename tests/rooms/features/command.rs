@@ -191,7 +191,8 @@ fn features_of_the_files_are_those_of_refine() {
     // by refine itself, once more
     let again = ["features_2.json", "touches_2.csv", "refined_2.ply"].map(|name| folder.name(name));
     let refine = ["refine", "--scan", &scan, "--bag", &bag, "--features-out", &again[0], "--touches-out", &again[1]];
-    done(&touchup(&[&refine[..], &["--out", &again[2], "--json"]].concat()));
+    let tip = ["--tip-radius-mm", "1.5"];
+    done(&touchup(&[&refine[..], &tip, &["--out", &again[2], "--json"]].concat()));
     for (first, again) in
         [("features.json", "features_2.json"), ("touches.csv", "touches_2.csv"), ("refined.ply", "refined_2.ply")]
     {
@@ -201,7 +202,7 @@ fn features_of_the_files_are_those_of_refine() {
     // nothing that is read is written over, and nothing that is written is written over
     let out = folder.name("out.ply");
     let flags = |features: &str, touches: &str| {
-        let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out];
+        let refine = ["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--tip-radius-mm", "1.5"];
         touchup(&[&refine[..], &["--features-out", features, "--touches-out", touches]].concat())
     };
     let before = [folder.bytes("scan.ply"), folder.bytes("touch.mcap")];

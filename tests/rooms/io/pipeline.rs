@@ -142,7 +142,10 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     let mut results = vec![];
     for (bag, out) in [(&mcap, "a.ply"), (&db3, "b.ply"), (&mcap, "c.ply"), (&db3, "d.ply")] {
         let output = refine(&at("patch.ply"), bag, &at(out), &flags);
-        assert_eq!((code(&output), stderr(&output)), (0, String::new()), "nothing is lost");
+        let said = stderr(&output);
+        // a phantom is no plane
+        let is_doubted = said.lines().count() == 1 && said.contains("perhaps: the ball's centre is");
+        assert!(code(&output) == 0 && is_doubted, "nothing is lost: {said}");
         let mut summary = summary(&output);
         for time in ["push_ns", "load_s", "replay_s"] {
             summary.as_object_mut().unwrap().remove(time);
@@ -191,7 +194,9 @@ impl Plate {
     }
 
     fn refine(&self, out: &str, flags: &[&str]) -> Output {
-        refine(&self.at("scan.ply"), &self.at("touch.mcap"), &self.at(out), &[flags, &["--json"]].concat())
+        let is_told = flags.iter().any(|flag| ["--tip-radius-mm", "--scene"].contains(flag));
+        let tip: &[&str] = if is_told { &[] } else { &["--tip-radius-mm", "1.5"] };
+        refine(&self.at("scan.ply"), &self.at("touch.mcap"), &self.at(out), &[flags, tip, &["--json"]].concat())
     }
 
     fn bytes(&self, name: &str) -> Vec<u8> {
@@ -369,7 +374,8 @@ fn damaged_recordings_are_refused_or_read_as_far_as_they_go() {
             let how = damage(&mut bytes, &mut Pcg64::seed_from_u64(seed));
             let damaged = folder.path().join(file);
             fs::write(&damaged, &bytes).unwrap();
-            let output = refine(&scan, &damaged, &out, &PROBE);
+            // its touches are too light for the default threshold
+            let output = refine(&scan, &damaged, &out, &[&PROBE[..], &["--force"]].concat());
             let what = format!("{file}, seed {seed}, {how}");
             check_outcome(&output, &out, MeshUnit::Millimetre, || faces, &what);
             if code(&output) == 3 {
@@ -399,7 +405,8 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
     for scan in &files {
         for &unit in &[MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch][..either(1, 3)] {
             let what = format!("{} in {unit}", scan.display());
-            let flags = ["--json", "--mesh-unit", &unit.to_string()];
+            // whatever is said of touches of another part
+            let flags = ["--json", "--force", "--tip-radius-mm", "1.5", "--mesh-unit", &unit.to_string()];
             let output = refine(scan, &plate.at("touch.mcap"), &out, &flags);
             let name = scan.file_name().unwrap().to_str().unwrap();
             assert!(code(&output) != 3 || stderr(&output).contains(name), "{what}: {}", stderr(&output));

@@ -157,7 +157,7 @@ impl InputMonitor {
 
     /// All doubts so far, the surest and most basic first; empty: none.
     pub fn findings(&self, scan: &TriMesh, tree: &FaceTree) -> Vec<InputFinding> {
-        let mut findings = self.stamps.findings(self.params.sync.largest_gap_ns);
+        let mut findings = self.stamps.findings(self.params.sync.largest_gap_ns, self.samples);
         if findings.iter().any(|finding| finding.is_sure) {
             return findings;
         }
@@ -235,7 +235,8 @@ impl InputMonitor {
             findings.push(InputFinding::new(InputCause::Tare, rest > on, measured, remedy));
         }
         let (clip, times) = self.largest;
-        if times > 20 && times as f64 > 0.002 * self.samples as f64 && clip > 0.5 * largest {
+        // where even the noise repeats itself, a value that does says nothing
+        if noise > 0.0 && times > 20 && times as f64 > 0.002 * self.samples as f64 && clip > 0.5 * largest {
             let measured = format!("{times} samples have a force component of exactly {clip:.3} N, the largest");
             let remedy = "the sensor is saturated: press less, or choose a wider range";
             let is_sure = times as f64 > 0.01 * self.samples as f64;
@@ -309,7 +310,8 @@ impl InputMonitor {
             return false;
         }
         // all as far from the surface as each other: another ball
-        if is_ball && reported.distance > 0.0 && reported.scatter <= noise + 0.2 * scale.edge + 0.1e-3 {
+        let may_be_ball = is_ball && (0.0..LARGEST_BALL * scale.extent).contains(&reported.distance);
+        if may_be_ball && reported.scatter <= noise + 0.2 * scale.edge + 0.1e-3 {
             findings.push(off_by_radius(&reported, radius, error));
             return true;
         }
@@ -322,8 +324,14 @@ impl InputMonitor {
             100.0 * reported.share
         );
         let remedy = "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
-        findings.push(InputFinding::new(InputCause::Frame, true, measured, remedy));
-        false
+        // a rough scan: most are less than a radius off, and hardly one is far
+        let wide = radius.max(tolerance) + sunk;
+        let share_within = |distance: f64| self.fit(scan, tree, pressing, distance).share;
+        let is_near = (reported.distance - radius).abs() <= wide
+            && share_within(wide) >= SHARE_ON_SCAN
+            && share_within(FAR * wide) >= SHARE_NOT_FAR;
+        findings.push(InputFinding::new(InputCause::Frame, !is_near, measured, remedy));
+        is_near
     }
 
     /// Returns whether the forces follow the normal.
@@ -413,6 +421,11 @@ fn w_first(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
 
 /// A ball this much farther from the surface than its radius is another one.
 const LEAST_RATIO: f64 = 20.0;
+/// Of contacts on a rough scan this share is not farther off than so many times what most are.
+const SHARE_NOT_FAR: f64 = 0.9;
+const FAR: f64 = 3.0;
+/// No ball is larger than this share of the scan that it is for.
+const LARGEST_BALL: f64 = 0.25;
 /// No scanner is worse, m.
 const LARGEST_SCAN_NOISE: f64 = 2e-3;
 

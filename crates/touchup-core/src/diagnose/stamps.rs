@@ -54,7 +54,8 @@ impl InputStamps {
     }
 
     /// - `largest_gap_ns`: between two poses that are interpolated.
-    pub fn findings(&self, largest_gap_ns: i64) -> Vec<InputFinding> {
+    /// - `samples`: how many came of the messages.
+    pub fn findings(&self, largest_gap_ns: i64, samples: u64) -> Vec<InputFinding> {
         let mut findings = Vec::new();
         for (name, stream) in [("poses", &self.poses), ("wrenches", &self.wrenches)] {
             if stream.count >= FEWEST && 2 * stream.zeros > stream.count {
@@ -62,7 +63,7 @@ impl InputStamps {
                     InputCause::ZeroStamps,
                     true,
                     format!("{} of {} {name} have the stamp 0", stream.zeros, stream.count),
-                    "have the driver fill header.stamp with the time of measurement",
+                    "have the driver fill header.stamp with the time of measurement; --stamp log takes when they were recorded",
                 ));
             } else if stream.backs > 0 {
                 findings.push(InputFinding::new(
@@ -87,13 +88,15 @@ impl InputStamps {
                     InputCause::TwoEpochs,
                     true,
                     format!("the wrenches are stamped {later:+.3} s beyond the poses: no instant has both"),
-                    "stamp both by one clock",
+                    "stamp both by one clock; --stamp log takes when they were recorded",
                 ));
             }
         }
         let gap = largest_gap_ns as f64 * 1e-9;
         let period = median(&mut self.poses.periods.clone()).unwrap_or(0.0);
-        if self.poses.count >= FEWEST && period > gap {
+        // a pose at the stamp of the wrench needs no other
+        let is_paired = 2 * samples > self.wrenches.count;
+        if self.poses.count >= FEWEST && period > gap && !is_paired {
             findings.push(InputFinding::new(
                 InputCause::SlowPoses,
                 true,

@@ -102,7 +102,12 @@ impl Db3Reader {
                 return Err(Damage::RowOrder);
             }
             self.last = (time, id);
-            self.rows.push_back(RawMessage { kind, payload: payload.into(), place: FilePlace::Row(id) });
+            self.rows.push_back(RawMessage {
+                kind,
+                payload: payload.into(),
+                logged_ns: time,
+                place: FilePlace::Row(id),
+            });
         }
         self.done = self.rows.len() < BATCH_ROWS;
         Ok(())

@@ -19,6 +19,9 @@ use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicI
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
+/// Topic, place of the payload in the records, log time, ns.
+type FoundMessage = (TopicKind, Range<usize>, i64);
+
 /// Channel, sequence, log time and publish time in front of a message's payload.
 const MESSAGE_HEAD_BYTES: usize = 22;
 
@@ -93,7 +96,7 @@ impl McapReader {
         RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Byte(self.at), damage }
     }
 
-    fn advance(&mut self) -> Result<Option<(TopicKind, Range<usize>)>, RecordingError> {
+    fn advance(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
         loop {
             while self.next < self.records.len() {
                 if let Some(message) = self.next_record()? {
@@ -107,7 +110,7 @@ impl McapReader {
     }
 
     /// Takes one record of the current chunk; a message of the two topics gives its payload's place in `records`.
-    fn next_record(&mut self) -> Result<Option<(TopicKind, Range<usize>)>, RecordingError> {
+    fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
         let (opcode, body) = split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;
         let start = self.next + HEAD_BYTES;
         self.next = start + body.len();
@@ -121,7 +124,8 @@ impl McapReader {
                 }
             }
             op::MESSAGE => {
-                let channel = Fields(body).u16("channel of a message").map_err(|damage| self.damaged(damage))?;
+                let mut head = Fields(body);
+                let channel = head.u16("channel of a message").map_err(|damage| self.damaged(damage))?;
                 let Some(info) = self.described.channels.get(&channel) else {
                     return Err(self.damaged(Damage::Undescribed { what: "channel", id: channel }));
                 };
@@ -129,7 +133,10 @@ impl McapReader {
                     return Err(self.damaged(Damage::Field("head of a message")));
                 }
                 let kind = self.topics.kind_of(&info.name);
-                return Ok(kind.map(|kind| (kind, start + MESSAGE_HEAD_BYTES..self.next)));
+                let mut logged = || head.u32("sequence of a message").and_then(|_| head.u64("log time of a message"));
+                let logged = logged().map_err(|damage| self.damaged(damage))?;
+                let logged_ns = i64::try_from(logged).unwrap_or(i64::MAX);
+                return Ok(kind.map(|kind| (kind, start + MESSAGE_HEAD_BYTES..self.next, logged_ns)));
             }
             _ => {}
         }
@@ -186,7 +193,7 @@ impl RecordingFile for McapReader {
     }
 
     fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        let Some((kind, payload)) = self.advance()? else {
+        let Some((kind, payload, logged_ns)) = self.advance()? else {
             return match self.promised {
                 Some(promised) if promised != self.found => {
                     Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
@@ -195,7 +202,8 @@ impl RecordingFile for McapReader {
             };
         };
         self.found += 1;
-        Ok(Some(RawMessage { kind, payload: Cow::Borrowed(&self.records[payload]), place: FilePlace::Byte(self.at) }))
+        let (payload, place) = (Cow::Borrowed(&self.records[payload]), FilePlace::Byte(self.at));
+        Ok(Some(RawMessage { kind, payload, logged_ns, place }))
     }
 }
 

@@ -54,6 +54,27 @@ impl Record {
             Self::Markers(frame) => frame.stamp_ns,
         }
     }
+
+    fn set_stamp(&mut self, stamp: i64) {
+        match self {
+            Self::Message(Message::Pose(pose)) => pose.stamp_ns = stamp,
+            Self::Message(Message::Wrench(wrench)) => wrench.stamp_ns = stamp,
+            Self::Markers(frame) => frame.stamp_ns = stamp,
+        }
+    }
+}
+
+touchup_core::names! {
+    /// Which time of a message is taken as that of its measurement.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+    pub enum StampSource {
+        /// The stamp of its header.
+        #[default]
+        Header = "header",
+        /// When the recorder took it: for headers without a stamp, or of clocks that have nothing in common. Both streams are as late then
+        /// as their way to the recorder was long.
+        Log = "log",
+    }
 }
 
 /// Names of the topics that make a touch.
@@ -140,6 +161,8 @@ impl TopicInfo {
 struct RawMessage<'a> {
     kind: TopicKind,
     payload: Cow<'a, [u8]>,
+    /// when the recorder took it, ns
+    logged_ns: i64,
     place: FilePlace,
 }
 

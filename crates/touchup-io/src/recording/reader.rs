@@ -14,7 +14,10 @@ use super::error::{BadCount, check_topics};
 use super::mcap::{self, McapReader};
 use super::point_cloud::decode_markers;
 use super::segments::segments_of;
-use super::{BadMessage, RawMessage, Record, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics, ZSTD_MAGIC};
+use super::{
+    BadMessage, RawMessage, Record, RecordingError, RecordingFile, StampSource, TopicInfo, TopicKind, Topics,
+    ZSTD_MAGIC,
+};
 use touchup_core::stylus::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
@@ -45,6 +48,7 @@ pub struct RecordingReader {
     source: Option<Box<dyn RecordingFile>>,
     rest: VecDeque<PathBuf>,
     intake: Intake,
+    stamps: StampSource,
     message_count: Option<u64>,
     truncated: bool,
 }
@@ -64,6 +68,7 @@ impl RecordingReader {
             source: None,
             rest: files_of(path)?,
             intake: Intake::default(),
+            stamps: StampSource::default(),
             message_count: Some(0),
             truncated: false,
         };
@@ -72,6 +77,11 @@ impl RecordingReader {
             reader.path = first;
         }
         Ok(reader)
+    }
+
+    /// The same, each message stamped by another of its times.
+    pub fn stamped_by(self, stamps: StampSource) -> Self {
+        Self { stamps, ..self }
     }
 
     /// Messages on the two topics, for a progress bar; `None` when a file does not say (MCAP without its end).
@@ -134,7 +144,10 @@ impl RecordingReader {
         loop {
             let Some(source) = &mut self.source else { return Ok(None) };
             if let Some(raw) = source.next_message()? {
-                if let Some(record) = self.intake.accept(&raw, &self.path) {
+                if let Some(mut record) = self.intake.accept(&raw, &self.path) {
+                    if self.stamps == StampSource::Log {
+                        record.set_stamp(raw.logged_ns);
+                    }
                     return Ok(Some(record));
                 }
                 continue;

@@ -7,7 +7,7 @@ use super::turns::spread;
 use crate::error::{MeasureError, Measured};
 use crate::{Spread, timed};
 use touchup_core::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams};
-use touchup_io::recording::{Topics, write_recording};
+use touchup_io::recording::{StampSource, Topics, write_recording};
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::Scene;
 
@@ -78,12 +78,20 @@ fn replay(
 ) -> Measured<f64> {
     let (mut count, mut outcome) = (0, Ok(()));
     let (seconds, replayed) = timed(|| {
-        each_sample(Recording::open(path, topics)?, None, sync, None, &mut || {}, &mut |_| (), |sample| {
-            count += 1;
-            if outcome.is_ok() {
-                outcome = push(sample);
-            }
-        })
+        each_sample(
+            Recording::open(path, topics, StampSource::Header)?,
+            None,
+            sync,
+            None,
+            &mut || {},
+            &mut |_| (),
+            |sample| {
+                count += 1;
+                if outcome.is_ok() {
+                    outcome = push(sample);
+                }
+            },
+        )
     });
     replayed?;
     outcome.map(|()| f64::from(count) / seconds)

@@ -115,6 +115,12 @@ impl Scene {
         Ok((scene, yaml))
     }
 
+    /// Whether the text of a scene gives a value to the key of a section; of a text that is no scene, `false`.
+    pub fn names(yaml: &str, section: &str, key: &str) -> bool {
+        let Ok(scene) = serde_saphyr::from_str::<serde_json::Value>(yaml) else { return false };
+        scene.get(section).and_then(|section| section.get(key)).is_some_and(|value| !value.is_null())
+    }
+
     /// The scan that the scene names, and the unit of its coordinates.
     ///
     /// - `path`: of the scene.

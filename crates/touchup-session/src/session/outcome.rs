@@ -36,6 +36,9 @@ pub enum OutcomeError {
     /// The patch is too large.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// The result would be the scan, or the scan and something beside it.
+    #[error("no face of the scan is moved or replaced: the touches are not on it")]
+    Unchanged,
 }
 
 /// Where a result goes.
@@ -51,6 +54,8 @@ pub struct OutcomePlaces<'a> {
     pub touches: Option<&'a Path>,
     /// the rest of a scan of which a part was refined
     pub outside: Option<&'a Outside>,
+    /// whether a result in which no face of the scan is moved or replaced is refused
+    pub must_change: bool,
 }
 
 /// Result on the touched part.
@@ -134,6 +139,7 @@ impl OutcomePlaces<'_> {
     pub fn write(&self, scan: &TriMesh, refined: &TriMesh, patcher: Option<Patcher>) -> Result<Outcome, OutcomeError> {
         let Some(patcher) = patcher else {
             let moved_faces = moved_faces(scan, refined);
+            self.check_changed(moved_faces as usize)?;
             let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
             let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
             write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
@@ -143,11 +149,16 @@ impl OutcomePlaces<'_> {
         self.write_patched(scan, patcher)
     }
 
+    fn check_changed(&self, changed_faces: usize) -> Result<(), OutcomeError> {
+        if self.must_change && changed_faces == 0 { Err(OutcomeError::Unchanged) } else { Ok(()) }
+    }
+
     /// Remeshes the touched part of the scan and writes the result.
     fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
         patcher.flush();
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;
+        self.check_changed(patched.removed_faces)?;
         if patched.pitch > wanted {
             let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
             warn!(

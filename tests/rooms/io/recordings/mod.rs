@@ -4,11 +4,14 @@
 //! field), which shares no code with this crate.
 
 use std::fs;
+use std::io::Cursor;
 use std::path::Path;
 
 use nalgebra::{Translation3, Vector3};
 use proptest::prelude::*;
-use touchup::io::recording::{BadMessage, FilePlace, RecordingError, RecordingReader, Topics, write_recording};
+use touchup::io::recording::{
+    BadMessage, FilePlace, RecordingError, RecordingReader, StampSource, Topics, write_recording,
+};
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
 mod damage;
@@ -304,4 +307,35 @@ fn other_files_are_named_for_what_they_are() {
     rusqlite::Connection::open(&path).unwrap().execute_batch("CREATE TABLE t(x)").unwrap();
     assert!(read(&path).error.unwrap().to_string().contains("topics"));
     assert!(matches!(read(&folder.path().join("none.mcap")).error, Some(RecordingError::Io { .. })));
+}
+
+/// Headers without a stamp: by the time of the log the messages are those that were stamped.
+#[test]
+fn by_the_log_messages_without_a_stamp_have_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = touch(200);
+    let mcap = mcap_bytes(&messages);
+    let unstamped = |data: &[u8]| {
+        let mut data = data.to_vec();
+        // behind the four bytes of CDR: s and ns
+        data[4..12].fill(0);
+        data
+    };
+    let db3 = folder.path().join("unstamped.db3");
+    db3_of(&db3, &mcap, unstamped);
+    let mut writer = ::mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+    for message in ::mcap::MessageStream::new(&mcap).unwrap() {
+        let message = message.unwrap();
+        writer.write(&::mcap::Message { data: unstamped(&message.data).into(), ..message }).unwrap();
+    }
+    writer.finish().unwrap();
+    let rewritten = put(folder.path(), "unstamped.mcap", &writer.into_inner().into_inner());
+    for path in [db3, rewritten] {
+        let read = |stamps| -> Vec<Message> {
+            let reader = RecordingReader::open(&path, &Topics::default()).unwrap().stamped_by(stamps);
+            reader.map(Result::unwrap).collect()
+        };
+        assert!(read(StampSource::Header).iter().all(|message| message.stamp_ns() == 0), "{}", path.display());
+        assert_eq!(read(StampSource::Log), messages, "{}", path.display());
+    }
 }
