@@ -8,13 +8,13 @@ use serde::Serialize;
 
 use super::progress::WorkProgress;
 use super::{CliError, Losses, print_report, require};
-use crate::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
+use crate::diagnose::{InputFinding, InputMonitor};
 use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::io::recording::{StampSource, Topics};
 use crate::mesh::FaceTree;
 use crate::replay::{Recording, each_sample, marker_filter};
-use crate::scene::{Mode, Scene};
-use crate::stylus::{ContactEstimator, ContactEstimatorParams, WrenchFrame};
+use crate::scene::Scene;
+use crate::stylus::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
@@ -76,7 +76,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
     let recording = Recording::open(&arguments.recording, &topics, arguments.stamp)?;
-    let params = input_monitor_params(&scene, recording.wrench_frame);
+    let params = scene.input_monitor_params(recording.wrench_frame);
     let monitor = RefCell::new(InputMonitor::new(params)?);
     let contact = ContactEstimatorParams {
         compensator: params.compensator,
@@ -109,19 +109,6 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     })?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
     Ok(replayed.losses)
-}
-
-/// What the scene says of the input.
-pub(super) fn input_monitor_params(scene: &Scene, wrench_frame: WrenchFrame) -> InputMonitorParams {
-    let has_gate = scene.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust);
-    InputMonitorParams {
-        compensator: scene.compensator_params(wrench_frame),
-        tip: scene.tip_params(),
-        shape: scene.tip_shape(),
-        scan_noise: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise),
-        contact_on: has_gate.then(|| scene.contact.unwrap_or_default().on),
-        sync: scene.sync_params(),
-    }
 }
 
 /// Refuses an input of which something is surely wrong.

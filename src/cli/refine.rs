@@ -11,7 +11,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::doctor::{NO_RADIUS, UNSOUND, input_monitor_params, refuse_unsound};
+use super::doctor::{NO_RADIUS, UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
@@ -90,6 +90,9 @@ pub(super) struct RefineArguments {
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
+    /// Whether it is a session of the node, which had its scene
+    #[arg(skip)]
+    is_session: bool,
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
@@ -270,7 +273,7 @@ impl RefineArguments {
             let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
             (self.bag, self.wrench_topic, self.pose_topic) = (recording, topics.wrench, topics.pose);
-            self.strokes = strokes;
+            (self.strokes, self.is_session) = (strokes, true);
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
             }
@@ -316,7 +319,7 @@ impl RefineArguments {
                 rates.change_strokes(change.is_undo);
             }
         };
-        let monitor = RefCell::new(InputMonitor::new(input_monitor_params(&scene, recording_frame))?);
+        let monitor = RefCell::new(InputMonitor::new(scene.input_monitor_params(recording_frame))?);
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         // an update that takes every sample for contact says nothing about contact
         let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
@@ -453,7 +456,7 @@ impl RefineArguments {
             None => ToldBy::Default,
         };
         let radius_by = told_by(self.tip_radius_mm, "tip", "radius_mm");
-        require(radius_by != ToldBy::Default, NO_RADIUS)?;
+        require(radius_by != ToldBy::Default || self.is_session, NO_RADIUS)?;
         if let Some(radius_mm) = self.tip_radius_mm {
             scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
         }

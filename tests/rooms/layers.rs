@@ -28,7 +28,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("calibrate", "numeric stylus mesh align"),
     ("diagnose", "numeric stylus mesh"),
     ("io", "parameters stylus mesh features align arm execute"),
-    ("scene", "parameters stylus mesh reconstruct haptic plan arm execute sim io"),
+    ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io"),
     ("report", "numeric stylus mesh reconstruct haptic live features align sim compare io scene session replay"),
@@ -36,7 +36,7 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live features plan arm execute sim align calibrate \
-         compare io scene session",
+         compare diagnose io scene session",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (

@@ -128,6 +128,10 @@ impl RefinementWorker {
             Verdict::Accepts if beyond.abs() > CLOCKS_APART => {
                 (DiagnosticStatus::WARN, format!("pairs what was not measured together: {apart}"))
             }
+            Verdict::Accepts if let Some(finding) = self.doubts.first() => {
+                let level = if finding.is_sure { DiagnosticStatus::ERROR } else { DiagnosticStatus::WARN };
+                (level, format!("doubts its input ({}): {finding}", finding.cause))
+            }
             Verdict::Accepts => (DiagnosticStatus::OK, "runs: samples are taken".to_owned()),
         }
     }

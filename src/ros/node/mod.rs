@@ -10,6 +10,7 @@ mod calls;
 mod channels;
 mod convert;
 mod diagnostics;
+mod doubts;
 mod error;
 mod feature_messages;
 mod feature_worker;

@@ -14,6 +14,7 @@ use super::acceptance::Acceptance;
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
 use super::convert::stamp_ns;
+use super::doubts::InputDoubts;
 use super::error::NodeError;
 use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
 use super::frames::FrameError;
@@ -84,6 +85,7 @@ pub struct RefinementWorker {
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     pub(super) streams: [StreamWatch; 2],
     pub(super) acceptance: Acceptance,
+    pub(super) doubts: InputDoubts,
     /// topics with messages that could not be read: when that was said, and how many came since
     unreadable: BTreeMap<&'static str, (Instant, u64)>,
     /// what stops the arm, and the samples
@@ -121,6 +123,7 @@ impl RefinementWorker {
         Self {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
+            doubts: InputDoubts::on(&setup.clock),
             resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
             port,
@@ -286,7 +289,9 @@ impl RefinementWorker {
             self.session.counters.refuse("stamp");
             return;
         }
-        let is_taken = self.session.sync.push(self.resolver.placed(message));
+        let placed = self.resolver.placed(message);
+        self.session.input.message(&placed);
+        let is_taken = self.session.sync.push(placed);
         if self.session.epoch.note(stream, message.stamp_ns(), is_taken, self.session.sync.newest_ns()) {
             warn!("the clock of both streams was set back: they are taken up where they are now");
             self.resolver.frames.forget_moving();
@@ -319,6 +324,10 @@ impl RefinementWorker {
             Ok(update) => {
                 self.session.counters.accepted += 1;
                 self.session.last_ns = Some(sample.stamp_ns);
+                self.session.input.sample(sample);
+                if let Some(contact) = self.session.engine.refiner().contact() {
+                    self.session.input.contact(contact);
+                }
                 self.publish_mismatch(&update);
                 self.note_changes();
             }
@@ -363,6 +372,7 @@ impl RefinementWorker {
         }
         if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY {
             self.diagnosed = now;
+            self.doubts.look(&self.setup, &self.session.input, self.session.counters.accepted);
             self.publish_diagnostics();
         }
     }
@@ -372,6 +382,7 @@ impl RefinementWorker {
         // its wrenches may come in other axes
         (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
         // a change of the session before means nothing in this one
+        self.doubts.restart();
         self.kept = self.unsent.take().or(self.kept.take());
         std::mem::replace(&mut self.session, next)
     }

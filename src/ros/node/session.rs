@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::error::NodeError;
 use super::setup::Setup;
 use super::streams::Epoch;
+use crate::diagnose::InputMonitor;
 use crate::io::session_folder::SessionFolder;
 use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta};
 use crate::mesh::TriMesh;
@@ -54,6 +55,8 @@ pub struct NodeSession {
     pub sent_edits: u64,
     /// pairs poses and wrenches
     pub sync: Synchroniser,
+    /// what came of poses and wrenches, to be doubted
+    pub input: InputMonitor,
     /// follows clocks that are set back
     pub epoch: Epoch,
     /// what was refused
@@ -142,6 +145,7 @@ impl NodeSession {
             sent_version: 1,
             sent_edits: 0,
             sync: Synchroniser::in_order(setup.scene.sync_params())?,
+            input: InputMonitor::new(setup.scene.input_monitor_params(axes))?,
             epoch: Epoch::default(),
             counters: Counters::default(),
             pushes: Latencies::new(),
@@ -159,6 +163,7 @@ impl NodeSession {
     /// [`NodeError`]
     pub fn turn_axes(&mut self, setup: &Setup, axes: WrenchFrame) -> Result<(), NodeError> {
         self.engine = engine_of(setup, axes)?;
+        self.input = InputMonitor::new(setup.scene.input_monitor_params(axes))?;
         self.axes = axes;
         Ok(())
     }

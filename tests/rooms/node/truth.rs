@@ -132,6 +132,36 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     assert_eq!((level, said.as_str()), (DiagnosticStatus::OK, "runs: samples are taken"));
 }
 
+/// Samples are taken, and what they say of the part cannot be.
+#[test]
+fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
+    let plate = Plate::touched(0.2);
+    let states_of = |sign: f64| {
+        let mut bench = Bench::start(&plate);
+        bench.play_as(&plate.messages, |message| {
+            let mut arrival = bench.arrival(message);
+            if let Arrival::Wrench(wrench, _) = &mut arrival {
+                let force = &mut wrench.wrench.force;
+                (force.x, force.y, force.z) = (sign * force.x, sign * force.y, sign * force.z);
+            }
+            vec![arrival]
+        });
+        let of_diagnostics = |published: &Publication| match published {
+            Publication::Diagnostics(message) => Some((message.status[0].level, message.status[0].message.clone())),
+            _ => None,
+        };
+        let states: Vec<_> = bench.published().iter().filter_map(of_diagnostics).collect();
+        bench.end();
+        states
+    };
+    let sound = states_of(1.0);
+    assert!(sound.len() > 10 && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR), "{sound:?}");
+    let reversed = states_of(-1.0);
+    let (level, said) = reversed.last().unwrap();
+    let is_named = said.starts_with("doubts its input (wrench_sign)") && said.contains("reverse the wrench");
+    assert!(*level == DiagnosticStatus::ERROR && is_named, "{said}");
+}
+
 /// The result is that of the messages without the wrong ones, byte for byte.
 #[test]
 fn a_wrong_stamp_costs_itself_alone() {

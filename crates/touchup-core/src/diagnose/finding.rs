@@ -4,46 +4,50 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// What would explain the recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum InputCause {
-    /// Stamps of zero.
-    ZeroStamps,
-    /// Poses and wrenches are stamped by clocks that have nothing in common.
-    TwoEpochs,
-    /// Stamps of one stream that go back.
-    StampsGoBack,
-    /// Poses too far apart in time to interpolate between them.
-    SlowPoses,
-    /// The wrench is stamped later or earlier than the pose of the same instant.
-    Delay,
-    /// No sample came of the messages.
-    NoSample,
-    /// No force that stands out of the noise.
-    NoContact,
-    /// Poses, scan or radius in another unit of length.
-    LengthUnit,
-    /// Axes of the positions are swapped or mirrored.
-    PositionAxes,
-    /// The contacts are not on the scan.
-    Frame,
-    /// The ball's centre is another distance off the surface than its radius.
-    Radius,
-    /// The wrench is what the stylus does to the part.
-    WrenchSign,
-    /// The wrench is in other axes than those it was read in.
-    WrenchFrame,
-    /// The components of the orientation are in another order.
-    QuaternionOrder,
-    /// A force that is there while nothing is touched.
-    Tare,
-    /// Forces in another unit.
-    ForceUnit,
-    /// Contacts whose force is below the threshold of contact.
-    LightTouch,
-    /// Forces clipped at one value.
-    Saturation,
+use crate::names;
+
+names! {
+    /// What would explain the recording.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum InputCause {
+        /// Stamps of zero.
+        ZeroStamps = "zero_stamps",
+        /// Poses and wrenches are stamped by clocks that have nothing in common.
+        TwoEpochs = "two_epochs",
+        /// Stamps of one stream that go back.
+        StampsGoBack = "stamps_go_back",
+        /// Poses too far apart in time to interpolate between them.
+        SlowPoses = "slow_poses",
+        /// The wrench is stamped later or earlier than the pose of the same instant.
+        Delay = "delay",
+        /// No sample came of the messages.
+        NoSample = "no_sample",
+        /// No force that stands out of the noise.
+        NoContact = "no_contact",
+        /// Poses, scan or radius in another unit of length.
+        LengthUnit = "length_unit",
+        /// Axes of the positions are swapped or mirrored.
+        PositionAxes = "position_axes",
+        /// The contacts are not on the scan.
+        Frame = "frame",
+        /// The ball's centre is another distance off the surface than its radius.
+        Radius = "radius",
+        /// The wrench is what the stylus does to the part.
+        WrenchSign = "wrench_sign",
+        /// The wrench is in other axes than those it was read in.
+        WrenchFrame = "wrench_frame",
+        /// The components of the orientation are in another order.
+        QuaternionOrder = "quaternion_order",
+        /// A force that is there while nothing is touched.
+        Tare = "tare",
+        /// Forces in another unit.
+        ForceUnit = "force_unit",
+        /// Contacts whose force is below the threshold of contact.
+        LightTouch = "light_touch",
+        /// Forces clipped at one value.
+        Saturation = "saturation",
+    }
 }
 
 /// A doubt about the input, what was measured, and what to do.

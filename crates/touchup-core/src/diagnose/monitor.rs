@@ -34,6 +34,8 @@ const LARGEST_PATH: f64 = 0.4e-3;
 const USUAL_SPEED: f64 = 0.04;
 /// A ball that is free is farther from the surface than one that presses by this at least, m.
 const LEAST_LIFT: f64 = 0.3e-3;
+/// … and by so many deviations of the scan: the scan may be that low under all of what rests.
+const LIFT_NOISES: f64 = 1.5;
 /// Half of what presses is beyond the median; of what is free, more than this is.
 const SHARE_OF_FREE: f64 = 0.55;
 /// Contacts are on the scan when this share of them is: where the scan lacks a wall or a hole, they are not.
@@ -183,7 +185,8 @@ impl InputMonitor {
         let pressing: Vec<&InputRecord> = thinned(self.records.iter().filter(|record| levels.is_pressing(record)));
         let press_fit = self.fit(scan, tree, &pressing, tolerance);
         // what rests on the surface presses all the time: then the rest is no force of free motion
-        let is_free = rest_fit.share_beyond(press_fit.distance.abs() + LEAST_LIFT) > SHARE_OF_FREE;
+        let lift = LEAST_LIFT.max(LIFT_NOISES * self.params.scan_noise.max(scale.noise));
+        let is_free = rest_fit.share_beyond(press_fit.distance.abs() + lift) > SHARE_OF_FREE;
         if !is_free {
             levels = levels.without_rest(&self.records);
         }

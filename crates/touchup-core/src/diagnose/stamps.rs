@@ -28,7 +28,7 @@ impl StreamStamps {
         self.count += 1;
         self.zeros += u64::from(stamp_ns == 0);
         if let Some([first_ns, newest_ns]) = &mut self.span_ns {
-            self.backs += u64::from(newest_ns.saturating_sub(stamp_ns) > GOES_BACK_NS);
+            self.backs += u64::from(self.last_ns.saturating_sub(stamp_ns) > GOES_BACK_NS);
             if self.periods.len() < MOST_PERIODS {
                 self.periods.push(stamp_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
             }
@@ -70,7 +70,7 @@ impl InputStamps {
                     InputCause::StampsGoBack,
                     stream.backs > stream.count / 4,
                     format!(
-                        "{} of {} {name} are stamped more than 1 s before an earlier one",
+                        "{} of {} {name} are stamped more than 1 s before the one before them",
                         stream.backs, stream.count
                     ),
                     "record with one steady clock; a recording that was started twice is two recordings",

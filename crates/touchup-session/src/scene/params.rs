@@ -7,6 +7,7 @@ use super::{
     CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection, ScanToSpaceSection,
     Scene, TipSection,
 };
+use touchup_core::diagnose::InputMonitorParams;
 use touchup_core::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
 use touchup_core::probing::arm::{ArmGeometry, TouchParams, UrGeometry};
 use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
@@ -78,6 +79,19 @@ impl Scene {
             pose_ts: Isometry3::from_parts(mount.position.into(), rotation),
             payload: payload.as_ref().map(|payload| Payload { gravity_o: of_space(payload), ..payload.payload }),
             bias_s: bias.map(|SensorBias { force, torque }| Wrench { force, torque }),
+        }
+    }
+
+    /// What the input is taken for, with a wrench that arrives in the axes of `wrench_frame`.
+    pub fn input_monitor_params(&self, wrench_frame: WrenchFrame) -> InputMonitorParams {
+        let has_gate = self.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust);
+        InputMonitorParams {
+            compensator: self.compensator_params(wrench_frame),
+            tip: self.tip_params(),
+            shape: self.tip_shape(),
+            scan_noise: self.scan_noise(),
+            contact_on: has_gate.then(|| self.contact.unwrap_or_default().on),
+            sync: self.sync_params(),
         }
     }
 

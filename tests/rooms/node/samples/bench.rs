@@ -73,6 +73,7 @@ impl Plate {
             bag.as_os_str(),
             "--out".as_ref(),
             out.as_os_str(),
+            "--tip-radius-mm=1.5".as_ref(),
         ]);
         std::fs::read(out).unwrap()
     }
