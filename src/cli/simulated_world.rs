@@ -72,45 +72,7 @@ pub(super) fn world_named(name: &str) -> Result<SimWorld, String> {
 ///
 /// - `lever`: root mean square distance of the part from its origin, m.
 pub(super) fn write_told_scene(drawn: &DrawnWorld, lever: f64, path: &Path) -> Result<(), CliError> {
-    let (told, sensor) = (&drawn.told, &drawn.stylus.sensor);
-    let mm = |v: &[f64]| format!("{:?}", v.iter().map(|x| x * 1e3).collect::<Vec<_>>());
-    let place = told.scan_to_space.translation.vector;
-    let turn = told.scan_to_space.rotation.coords;
-    // what a light force is told from: six deviations of the noise and what steps and play of the sensor add
-    let on_n = 0.4f64.max(6.0 * sensor.force_noise + sensor.force_play + sensor.force_step);
-    // … and what may be left of the zero
-    let free_n = 0.15f64.max(3.0 * told.stds.tare + sensor.force_play + sensor.force_step);
-    let gap_ms = 30f64.max(2.5e3 / sensor.pose_rate);
-    let text = format!(
-        "# What is told of world {world}, seed {seed}; truth.json has the truth beside it.\n\
-         sync:\n  wrench_offset_ms: {offset}\n  largest_gap_ms: {gap_ms}\n\
-         clock:\n\
-         scan_to_space:\n  position_mm: {place}\n  orientation_xyzw: {turn:?}\n\
-         compensation:\n  bias:\n    force_n: {tare:?}\n    torque_nm: [0, 0, 0]\n\
-         bias_tracking:\n\
-         contact:\n  on_n: {on_n}\n  off_n: {off_n}\n  free_n: {free_n}\n\
-         tip:\n  offset_mm: {tip}\n  radius_mm: {radius}\n  stiffness_n_per_mm: {stiffness}\n\
-         scan:\n  file: scan.ply\n  unit: mm\n  noise_mm: {noise}\n\
-         sliding:\n\
-         carve:\n  tolerance_mm: {tolerance}\n\
-         guard:\npatch:\n\
-         uncertainty:\n  calibration_mm: {calibration}\n  stiffness_percent: {stiffness_std}\n\
-         refine:\n",
-        world = drawn.world.name(),
-        seed = drawn.seed,
-        offset = told.wrench_clock * 1e3,
-        place = mm(place.as_slice()),
-        turn = [turn.x, turn.y, turn.z, turn.w],
-        tare = [told.tare.x, told.tare.y, told.tare.z],
-        off_n = 0.55 * on_n,
-        tip = mm(told.tip_offset.as_slice()),
-        radius = told.radius * 1e3,
-        stiffness = told.stiffness / 1e3,
-        noise = told.scan_noise * 1e3,
-        tolerance = 1e3 * sensor.pose_noise.max(0.05e-3),
-        calibration = told.calibration_std(lever) * 1e3,
-        stiffness_std = told.stds.stiffness * 100.0,
-    );
+    let text = drawn.told_scene(lever);
     write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes())).map_err(super::not_written(path))
 }
 

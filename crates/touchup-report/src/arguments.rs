@@ -1,7 +1,9 @@
 //! The command line of `touchup-report`: measures error against run time, stability and cost on this machine, and writes page, plots and tables.
 
 use std::io::{Write, stderr, stdout};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::{Instant, SystemTime};
 
 use chrono::{DateTime, Utc};
@@ -11,12 +13,15 @@ use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
 use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
 use touchup_io::recording::{StampSource, Topics};
+use touchup_report::coverage::CoverageParams;
 use touchup_report::document::Report;
 use touchup_report::error::MeasureError;
 use touchup_report::files::ReportError;
 use touchup_report::whole_scan::GivenPart;
 use touchup_report::work_precision::WorkPrecision;
-use touchup_report::{Chapter, Effort, TableCell, convergence, cost, extremes, stability, verdict, whole_scan};
+use touchup_report::{
+    Chapter, Effort, TableCell, convergence, cost, coverage, extremes, stability, verdict, whole_scan,
+};
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::{Scene, SceneError};
 
@@ -92,9 +97,28 @@ pub struct ReportArguments {
     /// Tip, sensor and frames of the recording
     #[arg(long, value_name = "YAML", requires = "scan")]
     scene: Option<PathBuf>,
+    /// Seeds of the worlds of the coverage chapter, first and last [default: 1-20, with --quick 1-1]
+    #[arg(long, value_name = "A-B")]
+    seeds: Option<Seeds>,
     /// Only these chapters
     #[arg(long, value_name = "CHAPTER", num_args = 1..)]
     only: Vec<ReportChapter>,
+}
+
+/// First and last seed.
+#[derive(Clone, Debug)]
+struct Seeds(RangeInclusive<u64>);
+
+impl FromStr for Seeds {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        match (first.parse(), last.parse()) {
+            (Ok(first), Ok(last)) if first <= last => Ok(Self(first..=last)),
+            _ => Err(format!("{text} is no range of seeds: give 1-20, or 7")),
+        }
+    }
 }
 
 /// A chapter, selectable by name.
@@ -110,6 +134,8 @@ enum ReportChapter {
     Stability,
     /// Time, allocations and memory of each stage and part
     Cost,
+    /// Errors of vertices and features over their stated uncertainties, in simulated worlds
+    Coverage,
 }
 
 /// Measures the selected chapters, writes the report, and prints the verdict.
@@ -192,6 +218,12 @@ impl ReportArguments {
         let cost = cost.transpose().map_err(CommandError::Cost)?;
         if let Some(measured) = &cost {
             add(measured.chapter(), verdict::of_cost(measured));
+        }
+        if is_wanted(ReportChapter::Coverage) {
+            let mut params = CoverageParams::of(effort);
+            params.seeds = self.seeds.as_ref().map_or(params.seeds, |seeds| seeds.0.clone());
+            let measured = coverage::coverage(params, progress);
+            add(measured.chapter(), verdict::of_coverage(&measured));
         }
         if let Some(measured) = peers {
             add(measured.chapter(), verdict::of_peers(&measured));

@@ -6,6 +6,7 @@
 pub mod allocations;
 pub mod convergence;
 pub mod cost;
+pub mod coverage;
 mod csv;
 pub mod document;
 mod double_double;

@@ -3,6 +3,7 @@
 
 use super::convergence::{Convergence, Rule};
 use super::cost::Cost;
+use super::coverage::Coverage;
 use super::extremes::Extremes;
 use super::figure::{Table, TableCell};
 use super::number::three_digits;
@@ -131,6 +132,20 @@ pub fn of_convergence(measured: &Convergence) -> Vec<String> {
     vec![format!(
         "Swept over and over, the published rule blew up on {paper_up} of {paper} scans, the robust mode on {robust_up} of {robust}."
     )]
+}
+
+/// Which stated uncertainties do not hold.
+pub fn of_coverage(measured: &Coverage) -> Vec<String> {
+    let outside = measured.outside();
+    let judged = measured.kinds.iter().filter(|of| of.holds().is_some()).count();
+    let contradicted: usize = measured.kinds.iter().map(|of| of.bounds()[1]).sum();
+    let mut text = format!(
+        "Coverage: {} of {judged} kinds in their worlds are stated as well as is demanded",
+        judged - outside.len()
+    );
+    text += &if outside.is_empty() { ".".to_owned() } else { format!("; OUTSIDE: {}.", outside.join("; ")) };
+    text += &format!(" Lower bounds that the truth contradicts: {contradicted}.");
+    vec![text]
 }
 
 /// Which step to take, and where even that fails.

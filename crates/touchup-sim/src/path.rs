@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 
 use super::error::{SimError, not_negative, positive, up_to};
-use super::plate::{Plate, PlateStadium};
+use super::plate::{Extrusion, Plate, PlateStadium};
 use super::surface::{Bounds, Surface};
 use touchup_core::numeric::turned_to;
 
@@ -59,9 +59,16 @@ settings! {
         wall_speed: f64 = 0.025, positive("the speed along walls", *wall_speed, "m/s");
         /// Distance of the guide beyond the wall along which it runs, m.
         lean: f64 = 0.4e-3, not_negative("the size of the lean", lean.abs(), "m");
+        /// Share of a turn that a run around a wall goes; at 1 it goes a little farther, so that no gap is left at its start.
+        turn: f64 = 1.0, share_of_turn(*turn);
         /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
         longest: f64 = 90.0, positive("the longest time", *longest, "s");
     }
+}
+
+fn share_of_turn(turn: f64) -> Result<(), SimError> {
+    positive("the share of a turn", turn, "")?;
+    up_to("the share of a turn", turn, "", 1.0, "1 or less")
 }
 
 /// Lines of a raster at most: 200 m of them at the usual pitch.
@@ -78,6 +85,8 @@ const OVERRUN: f64 = 2.5;
 const PIECE: f64 = 1e-3;
 /// A ball this close touches, m: far less than it is pressed in.
 const TOUCHING: f64 = 10e-6;
+/// A ball goes around in a hole where the guide of its centre has at least this radius, m.
+const ROOM: f64 = 0.5e-3;
 /// Longest chord of a run along a curved wall, m.
 const CHORD: f64 = 0.2e-3;
 
@@ -121,7 +130,7 @@ pub fn raster(region: &RasterRegion, lines: Lines, params: &PathParams) -> Resul
     ])
 }
 
-/// Runs once around the wall along z over an outline, at each of the given heights of the ball's centre.
+/// Runs around the wall along z over an outline, by [`PathParams::turn`] of a turn, at each of the given heights of the ball's centre.
 ///
 /// - `inside`: along a hole or slot from within, else around a boss from without.
 /// - `heights`: z, m, in O; `clear`: z at which the ball is free, m, in O.
@@ -135,7 +144,11 @@ pub fn around_wall(
     let lean = if inside { params.lean - params.radius } else { params.radius - params.lean };
     let track = PlateStadium { radius: outline.radius + lean, ..*outline };
     let mut ring = track.polygon(CHORD * CHORD / (8.0 * track.radius));
-    ring.extend_from_within(..(ring.len() as f64 * OVERLAP).ceil() as usize + 1);
+    if params.turn < 1.0 {
+        ring.truncate((ring.len() as f64 * params.turn).ceil() as usize + 1);
+    } else {
+        ring.extend_from_within(..(ring.len() as f64 * OVERLAP).ceil() as usize + 1);
+    }
     let centre = outline.centre();
     // from the middle of a hole, or from beside a boss
     let start = if inside { centre } else { centre + (ring[0] - centre) * (1.0 + CLEARANCE / track.radius) };
@@ -173,12 +186,26 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     // across the edge in close lines, then along both of its sides
     strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params)?);
     strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params)?);
-    for (e, inside) in [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)] {
+    strokes.extend(plan_walls(plate, params)?);
+    Ok(strokes)
+}
+
+/// Runs along the walls of the plate's holes, slot and boss, for a ball that goes in; a hole that is too narrow for it is left out.
+///
+/// # Errors
+/// [`SimError::BadParameter`].
+pub fn plan_walls(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimError> {
+    params.check()?;
+    let clear = plate.bounds().max.z + params.radius + CLEARANCE;
+    let walls = [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)];
+    let reached =
+        walls.into_iter().filter(|(e, inside)| !inside || e.outline.radius + params.lean > params.radius + ROOM);
+    let around = |(e, inside): (&Extrusion, bool)| {
         // near the floor (the ball touches floor and wall at once), halfway up, and just below the rim
         let heights = [e.low + 0.9 * params.radius, (e.low + e.high) / 2.0, e.high - params.radius / 2.0];
-        strokes.extend(around_wall(&e.outline, inside, &heights, clear, params));
-    }
-    Ok(strokes)
+        around_wall(&e.outline, inside, &heights, clear, params)
+    };
+    Ok(reached.flat_map(around).collect())
 }
 
 /// Rasters in both directions over all of a surface that can be reached from one side.

@@ -10,7 +10,8 @@ use rand_pcg::Pcg64;
 
 use super::error::{SimError, not_negative};
 use super::habit::Habit;
-use super::path::{PathParams, Stroke, plan_mesh};
+use super::path::{PathParams, Stroke, plan_mesh, plan_walls};
+use super::plate::Plate;
 use super::random::{gauss, gauss_vector, uniform};
 use super::scanner::{ScannerParams, scan};
 use super::sensor::SensorParams;
@@ -449,6 +450,66 @@ impl DrawnWorld {
     /// As [`touch`].
     pub fn touch(&self, surface: &dyn Surface, strokes: &[Stroke]) -> Result<Touch, SimError> {
         touch(surface, strokes, &self.stylus, self.seed)
+    }
+
+    /// The hand's strokes over the plate: as [`DrawnWorld::strokes`], and along the walls of its features.
+    ///
+    /// - `turn`: share of a turn that the runs along walls go; `None`: the hand goes into no hole.
+    ///
+    /// # Errors
+    /// As [`plan_mesh`], and for a share beyond 1.
+    pub fn strokes_on_plate(&self, plate: &Plate, longest: f64, turn: Option<f64>) -> Result<Vec<Stroke>, SimError> {
+        let mut strokes = self.strokes(plate, longest)?;
+        if let Some(turn) = turn {
+            let hand = PathParams { radius: self.stylus.radius, turn, ..PathParams::default() };
+            strokes.extend(plan_walls(plate, &hand)?);
+        }
+        Ok(strokes)
+    }
+
+    /// What is told, as the scene of a scan `scan.ply` in mm.
+    ///
+    /// - `lever`: root mean square distance of the part from its origin, m.
+    pub fn told_scene(&self, lever: f64) -> String {
+        let (told, sensor) = (&self.told, &self.stylus.sensor);
+        let mm = |v: &[f64]| format!("{:?}", v.iter().map(|x| x * 1e3).collect::<Vec<_>>());
+        let place = told.scan_to_space.translation.vector;
+        let turn = told.scan_to_space.rotation.coords;
+        // what a light force is told from: six deviations of the noise and what steps and play of the sensor add
+        let on_n = 0.4f64.max(6.0 * sensor.force_noise + sensor.force_play + sensor.force_step);
+        // … and what may be left of the zero
+        let free_n = 0.15f64.max(3.0 * told.stds.tare + sensor.force_play + sensor.force_step);
+        let gap_ms = 30f64.max(2.5e3 / sensor.pose_rate);
+        format!(
+            "# What is told of world {world}, seed {seed}; truth.json has the truth beside it.\n\
+             sync:\n  wrench_offset_ms: {offset}\n  largest_gap_ms: {gap_ms}\n\
+             clock:\n\
+             scan_to_space:\n  position_mm: {place}\n  orientation_xyzw: {turn:?}\n\
+             compensation:\n  bias:\n    force_n: {tare:?}\n    torque_nm: [0, 0, 0]\n\
+             bias_tracking:\n\
+             contact:\n  on_n: {on_n}\n  off_n: {off_n}\n  free_n: {free_n}\n\
+             tip:\n  offset_mm: {tip}\n  radius_mm: {radius}\n  stiffness_n_per_mm: {stiffness}\n\
+             scan:\n  file: scan.ply\n  unit: mm\n  noise_mm: {noise}\n\
+             sliding:\n\
+             carve:\n  tolerance_mm: {tolerance}\n\
+             guard:\npatch:\n\
+             uncertainty:\n  calibration_mm: {calibration}\n  stiffness_percent: {stiffness_std}\n\
+             refine:\n",
+            world = self.world.name(),
+            seed = self.seed,
+            offset = told.wrench_clock * 1e3,
+            place = mm(place.as_slice()),
+            turn = [turn.x, turn.y, turn.z, turn.w],
+            tare = [told.tare.x, told.tare.y, told.tare.z],
+            off_n = 0.55 * on_n,
+            tip = mm(told.tip_offset.as_slice()),
+            radius = told.radius * 1e3,
+            stiffness = told.stiffness / 1e3,
+            noise = told.scan_noise * 1e3,
+            tolerance = 1e3 * sensor.pose_noise.max(0.05e-3),
+            calibration = told.calibration_std(lever) * 1e3,
+            stiffness_std = told.stds.stiffness * 100.0,
+        )
     }
 
     /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of [`Told::calibration_std`].

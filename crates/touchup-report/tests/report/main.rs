@@ -2,6 +2,7 @@
 
 mod command;
 mod cost;
+mod coverage;
 mod extremes;
 mod page;
 mod stability;

@@ -1,0 +1,150 @@
+//! Whether stated uncertainties hold: parts of known truth, touched in named worlds, and the error of each number over its stated
+//! standard deviation.
+//!
+//! A world draws its truth from a seed, and the program is told what a calibration leaves of it ([`SimWorld`]). Scan and recording are made
+//! in memory, and go through the engine and the search for features of `touchup refine`.
+
+mod case;
+mod kind;
+mod text;
+mod truth;
+
+use std::ops::RangeInclusive;
+
+pub use kind::CoverageKind;
+
+use super::Effort;
+use touchup_sim::SimWorld;
+
+/// What is run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoverageParams {
+    /// in this order
+    pub worlds: Vec<SimWorld>,
+    /// of each world
+    pub seeds: RangeInclusive<u64>,
+    /// longest time of the rasters over the part, s
+    pub longest: f64,
+}
+
+impl CoverageParams {
+    /// One seed of two worlds, or twenty of all.
+    pub fn of(effort: Effort) -> Self {
+        Self {
+            worlds: SimWorld::ALL[..effort.choose(2, SimWorld::ALL.len())].to_vec(),
+            seeds: 1..=effort.choose(1, 20),
+            longest: effort.choose(20.0, 60.0),
+        }
+    }
+}
+
+/// A number that was stated, beside the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StatedNumber {
+    /// stated less true, m
+    pub error: f64,
+    /// stated standard deviation, m; 0: none
+    pub std: f64,
+    /// whether it was stated as a lower bound
+    pub is_at_least: bool,
+}
+
+impl StatedNumber {
+    /// Error over stated standard deviation; `None` for a bound, and where none is stated.
+    pub fn score(&self) -> Option<f64> {
+        (!self.is_at_least && self.std > 0.0).then(|| self.error / self.std)
+    }
+
+    /// Whether the truth is below a stated lower bound by more than what is known of that.
+    fn contradicts(&self) -> bool {
+        self.is_at_least && self.error > SIGMAS_95 * self.std
+    }
+}
+
+/// The numbers of one kind in one world, over all seeds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KindInWorld {
+    /// which world
+    pub world: SimWorld,
+    /// which kind
+    pub kind: CoverageKind,
+    /// all of them
+    pub numbers: Vec<StatedNumber>,
+}
+
+/// Errors over stated standard deviations, by world and kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coverage {
+    /// what was run
+    pub params: CoverageParams,
+    /// each kind that was met in each world
+    pub kinds: Vec<KindInWorld>,
+    /// a case that could not be run, in words
+    pub failed: Vec<String>,
+}
+
+/// Standard deviations that hold 95 % of a normal distribution.
+const SIGMAS_95: f64 = 1.96;
+/// The root mean square of error over stated standard deviation is to be within these.
+pub const HONEST: [f64; 2] = [0.8, 1.25];
+
+impl KindInWorld {
+    fn scores(&self) -> impl Iterator<Item = f64> {
+        self.numbers.iter().filter_map(StatedNumber::score)
+    }
+
+    /// How many have a stated standard deviation and are no bounds.
+    pub fn count(&self) -> usize {
+        self.scores().count()
+    }
+
+    /// Mean of their errors, m.
+    pub fn mean_error(&self) -> Option<f64> {
+        mean(self.numbers.iter().filter(|number| number.score().is_some()).map(|number| number.error))
+    }
+
+    /// Root mean square of error over stated standard deviation; 1 where the statement holds.
+    pub fn rms_score(&self) -> Option<f64> {
+        mean(self.scores().map(|score| score * score)).map(f64::sqrt)
+    }
+
+    /// Share of the numbers within 1.96 stated standard deviations of the truth.
+    pub fn share_within(&self) -> Option<f64> {
+        mean(self.scores().map(|score| f64::from(u8::from(score.abs() <= SIGMAS_95))))
+    }
+
+    /// How many are lower bounds, and how many of these the truth contradicts.
+    pub fn bounds(&self) -> [usize; 2] {
+        let bounds = || self.numbers.iter().filter(|number| number.is_at_least);
+        [bounds().count(), bounds().filter(|bound| bound.contradicts()).count()]
+    }
+
+    /// Whether the statements hold as well as is demanded; `None` where there is none.
+    pub fn holds(&self) -> Option<bool> {
+        let rms = self.rms_score()?;
+        let is_enough = self.kind.least_within().is_none_or(|least| self.share_within() >= Some(least));
+        Some((HONEST[0]..=HONEST[1]).contains(&rms) && is_enough)
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Runs each seed of each world.
+pub fn coverage(params: CoverageParams, progress: &mut dyn FnMut(&str)) -> Coverage {
+    let (mut kinds, mut failed) = (Vec::new(), Vec::new());
+    for &world in &params.worlds {
+        let mut of_world = CoverageKind::ALL.map(|kind| KindInWorld { world, kind, numbers: Vec::new() });
+        for seed in params.seeds.clone() {
+            progress(&format!("coverage: {}, seed {seed}", world.name()));
+            match case::run(world, seed, params.longest) {
+                Ok(found) => found.into_iter().for_each(|(kind, number)| of_world[kind as usize].numbers.push(number)),
+                Err(error) => failed.push(format!("{}, seed {seed}: {error}", world.name())),
+            }
+        }
+        kinds.extend(of_world.into_iter().filter(|of_kind| !of_kind.numbers.is_empty()));
+    }
+    Coverage { params, kinds, failed }
+}

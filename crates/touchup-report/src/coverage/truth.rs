@@ -1,0 +1,138 @@
+//! Which place and which feature of the true plate a stated number is of.
+
+use nalgebra::{Point3, Vector2, Vector3};
+
+use super::{CoverageKind, StatedNumber};
+use touchup_core::features::{Feature, FittedTo, Kind, Measured};
+use touchup_core::reconstruct::Support;
+use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};
+
+/// A place of the surface is at an edge or a rim within this distance of it, m.
+const NEAR_EDGE: f64 = 1e-3;
+/// Cosine of the angle of two normals beyond which the edge between them is sharp.
+const SHARP: f64 = 0.866;
+/// A found feature is the true one whose place is within this distance, m.
+const SAME: f64 = 2e-3;
+/// Cosine of the largest angle between two directions that are the same.
+const PARALLEL: f64 = 0.9;
+
+/// The kind of a vertex; `None` for those of the scan, and where no ball reaches.
+pub(super) fn vertex_kind(p: &Point3<f64>, support: Support, plate: &Plate) -> Option<CoverageKind> {
+    match support {
+        Support::Scan | Support::Unreachable => None,
+        Support::Guessed => Some(CoverageKind::InterpolatedVertex),
+        Support::Touched => {
+            let on_part = plate.closest(p).point;
+            let mut near = Vec::new();
+            plate.near(&on_part, NEAR_EDGE, &mut near);
+            let is_sharp = near.iter().any(|a| near.iter().any(|b| a.normal.dot(&b.normal) < SHARP));
+            Some(match (is_sharp, plate.features().iter().any(|feature| is_at_opening(feature, &on_part))) {
+                (false, _) => CoverageKind::PlaneVertex,
+                (true, false) => CoverageKind::EdgeVertex,
+                (true, true) => CoverageKind::RimVertex,
+            })
+        }
+    }
+}
+
+/// Whether a place is within [`NEAR_EDGE`] of the opening of a hole or slot.
+fn is_at_opening(feature: &TruthFeature, p: &Point3<f64>) -> bool {
+    let off = p - feature.centre;
+    let (radius, spine) = match feature.shape {
+        TruthShape::Hole { diameter, .. } => (diameter / 2.0, Vector3::zeros()),
+        TruthShape::Slot { width, length, direction, .. } => {
+            let reach = (length - width) / 2.0;
+            (width / 2.0, direction * off.dot(&direction).clamp(-reach, reach))
+        }
+        TruthShape::Boss { .. } | TruthShape::Step { .. } => return false,
+    };
+    ((off - spine).xy().norm() - radius).hypot(off.z) <= NEAR_EDGE
+}
+
+/// The numbers of a found feature beside those of the true one; none where it is no feature of the plate.
+pub(super) fn feature_numbers(feature: &Feature, plate: &Plate) -> Vec<(CoverageKind, StatedNumber)> {
+    let mut numbers = match feature.kind {
+        Kind::Hole | Kind::Slot | Kind::Boss => plate.features().iter().find_map(|truth| of_walls(feature, truth)),
+        Kind::Plane => of_plane(feature, plate),
+        Kind::Edge => of_edge(feature, plate),
+        Kind::Pocket | Kind::Corner => None,
+    }
+    .unwrap_or_default();
+    if feature.fitted_to == FittedTo::Mesh {
+        numbers.iter_mut().for_each(|(kind, _)| *kind = CoverageKind::OfMesh);
+    }
+    numbers
+}
+
+fn stated(kind: CoverageKind, found: &Measured<f64>, truth: f64) -> (CoverageKind, StatedNumber) {
+    let (error, std) = (found.value - truth, found.std.unwrap_or(0.0));
+    (kind, StatedNumber { error, std, is_at_least: found.is_at_least })
+}
+
+/// Both directions across an axis: their standard deviations make up the stated one, √(σ₁² + σ₂²).
+fn across(kind: CoverageKind, off: Vector2<f64>, centre: &Measured<Point3<f64>>) -> [(CoverageKind, StatedNumber); 2] {
+    let std = centre.std.unwrap_or(0.0) / 2f64.sqrt();
+    [off.x, off.y].map(|error| (kind, StatedNumber { error, std, is_at_least: centre.is_at_least }))
+}
+
+fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind, StatedNumber)>> {
+    use CoverageKind as K;
+    let off = (feature.centre.value - truth.centre).xy();
+    let axis = feature.axis.as_ref().map_or(truth.axis, |axis| axis.value);
+    if off.norm() > SAME || axis.dot(&truth.axis) < PARALLEL {
+        return None;
+    }
+    let (place, sizes) = match (feature.kind, truth.shape) {
+        (Kind::Hole, TruthShape::Hole { diameter, depth, through }) => {
+            let depth = (!through).then_some((K::HoleDepth, &feature.depth, depth));
+            (K::HolePosition, vec![Some((K::HoleDiameter, &feature.diameter, diameter)), depth])
+        }
+        (Kind::Slot, TruthShape::Slot { width, length, depth, .. }) => {
+            let sizes = [
+                (K::SlotWidth, &feature.width, width),
+                (K::SlotLength, &feature.length, length),
+                (K::SlotDepth, &feature.depth, depth),
+            ];
+            (K::SlotPosition, sizes.map(Some).to_vec())
+        }
+        (Kind::Boss, TruthShape::Boss { diameter, height }) => {
+            let sizes = [(K::BossDiameter, &feature.diameter, diameter), (K::BossHeight, &feature.depth, height)];
+            (K::BossPosition, sizes.map(Some).to_vec())
+        }
+        _ => return None,
+    };
+    let sizes = sizes.into_iter().flatten();
+    let sizes = sizes.filter_map(|(kind, found, truth)| Some(stated(kind, found.as_ref()?, truth)));
+    Some(across(place, off, &feature.centre).into_iter().chain(sizes).collect())
+}
+
+/// The true surface at its middle, along its normal.
+fn of_plane(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, StatedNumber)>> {
+    let (centre, normal) = (&feature.centre, feature.axis.as_ref()?.value);
+    let mut near = Vec::new();
+    plate.near(&centre.value, SAME, &mut near);
+    let on_part = near.iter().find(|place| place.normal.dot(&normal) > PARALLEL)?;
+    let (error, std) = ((centre.value - on_part.point).dot(&on_part.normal), centre.std.unwrap_or(0.0));
+    Some(vec![(CoverageKind::PlanePosition, StatedNumber { error, std, is_at_least: false })])
+}
+
+/// The true edge at its middle, where two sides meet.
+fn of_edge(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, StatedNumber)>> {
+    let (centre, along) = (&feature.centre, feature.axis.as_ref()?.value);
+    let mut near = Vec::new();
+    plate.near(&centre.value, SAME, &mut near);
+    let pairs = near.iter().flat_map(|a| near.iter().map(move |b| (a, b)));
+    let is_edge = |(a, b): &(&SurfacePoint, &SurfacePoint)| {
+        sides_along(a, b).is_some_and(|edge| edge.dot(&along).abs() > PARALLEL)
+    };
+    let (a, b) = pairs.into_iter().find(is_edge)?;
+    // the two are perpendicular: each says where the edge is in one direction
+    let off = [a, b].map(|side| (centre.value - side.point).dot(&side.normal));
+    Some(across(CoverageKind::EdgePosition, off.into(), centre).to_vec())
+}
+
+/// Direction of the edge between two sides; `None` where they are none, or not perpendicular.
+fn sides_along(a: &SurfacePoint, b: &SurfacePoint) -> Option<Vector3<f64>> {
+    let edge = a.normal.cross(&b.normal);
+    (edge.norm() > PARALLEL).then(|| edge.normalize())
+}
