@@ -1,4 +1,4 @@
-//! Error against run time, stability, and what each part costs: everything that `touchup-report` measures and shows.
+//! Error against run time, stability, what each part costs, and whether stated uncertainties hold: everything that `touchup-report` measures and shows.
 //!
 //! Each part measures into a type of its own, writes it as a [`Chapter`], and returns what the verdict needs.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
@@ -31,7 +31,7 @@ pub use figure::{
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// the small report: under a minute where the whole one takes up to fifteen
+    /// the small report: under a minute where the whole one takes up to twenty-five
     pub is_quick: bool,
 }
 

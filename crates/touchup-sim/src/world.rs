@@ -467,6 +467,14 @@ impl DrawnWorld {
         Ok(strokes)
     }
 
+    /// Standard deviation of the one stiffness that is told, as a share of it: what a calibration leaves of the mean compliance C̄ = tr C / 3,
+    /// and by how much those of the three axes differ from that, √(Σ (Cᵢ − C̄)² / 3) / C̄, which one that presses along each of them sees.
+    pub fn stiffness_std(&self) -> f64 {
+        // their reciprocals have the mean 1
+        let uneven = self.stylus.stiffness_shares.map(|share| (share.recip() - 1.0).powi(2)).sum() / 3.0;
+        self.told.stds.stiffness.hypot(uneven.sqrt())
+    }
+
     /// What is told, as the scene of a scan `scan.ply` in mm.
     ///
     /// - `lever`: root mean square distance of the part from its origin, m.
@@ -508,7 +516,7 @@ impl DrawnWorld {
             noise = told.scan_noise * 1e3,
             tolerance = 1e3 * sensor.pose_noise.max(0.05e-3),
             calibration = told.calibration_std(lever) * 1e3,
-            stiffness_std = told.stds.stiffness * 100.0,
+            stiffness_std = self.stiffness_std() * 100.0,
         )
     }
 

@@ -138,8 +138,9 @@ impl<'a> Measure<'a> {
         of_mesh: &[Observation],
         axis_sigma: Option<f64>,
     ) -> Fitted<S> {
-        let params =
-            FitParams { common_sigma: self.observed.common_sigma(&touches), axis_sigma, ..FitParams::default() };
+        // how much of what calibration leaves is of the radius and how much of the frame nobody says: each may be all of it
+        let common_sigma = self.observed.common_sigma(&touches);
+        let params = FitParams { common_sigma, shift_sigma: common_sigma, axis_sigma, ..FitParams::default() };
         if !touches.is_empty()
             && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)
         {

@@ -161,7 +161,8 @@ impl Feature {
         let observations: Vec<_> =
             chosen.iter().zip(groups(&chosen)).map(|(touch, group)| observation(touch, group)).collect();
         let common_sigma = chosen.iter().map(|touch| touch.calibration).sum::<f64>() / chosen.len() as f64;
-        let params = FitParams { common_sigma, axis_sigma: Some(AXIS_KNOWN), ..FitParams::default() };
+        let axis_sigma = Some(AXIS_KNOWN);
+        let params = FitParams { common_sigma, shift_sigma: common_sigma, axis_sigma, ..FitParams::default() };
         let is_held = match &self.walls {
             Some(Walls::Round(cylinder)) => {
                 fit(cylinder, &observations, &params).map(|found| self.is_round(&found, &all)).is_ok()

@@ -166,6 +166,30 @@ fn planes_and_cones_are_right_in_the_mean_and_say_how_well() {
     assert!(mean.abs() < 3.0 * error, "{mean} ± {error}");
 }
 
+/// Arcs of a turn, a half and a sixth, each displaced as a whole by a drawn vector, with hardly any noise of their own.
+#[test]
+fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
+    let (mut rng, shift_sigma) = (generator(11), 0.02);
+    let guess = hole_near(&Isometry3::identity(), 1.0);
+    for arc in [2.0, 1.0, 1.0 / 3.0] {
+        let (mut of_place, mut of_size) = (Vec::new(), Vec::new());
+        for _ in 0..150 {
+            let shift = Vector3::from_fn(|_, _| shift_sigma * normal(&mut rng));
+            let touched: Vec<_> = on_cylinder(&mut rng, 1.0, arc * PI, 2.0, 40)
+                .iter()
+                .map(|o| Observation { point: o.point + shift, sigma: 1e-4, ..*o })
+                .collect();
+            let found = fit(&guess, &touched, &FitParams { shift_sigma, ..FitParams::default() }).unwrap();
+            let off = found.surface.center();
+            of_place.extend([off.x / found.std(Freedom::X).unwrap(), off.y / found.std(Freedom::Y).unwrap()]);
+            of_size.push(found.std(Freedom::Size).unwrap());
+        }
+        // root mean square of 300: 1 ± 3 / √600
+        assert!((rms(&of_place) - 1.0).abs() < 0.13, "arc {arc}: {}", rms(&of_place));
+        assert!(of_size.iter().all(|std| *std < 0.1 * shift_sigma), "arc {arc}: it is in no size");
+    }
+}
+
 #[test]
 fn a_common_error_goes_into_the_radius_and_not_into_the_axis() {
     let mut rng = generator(7);

@@ -24,6 +24,9 @@ pub struct FitParams {
     /// Standard deviation of an error that all observations have in common along their normals, m: the calibration of
     /// the ball's radius. It goes into radii and widths in full, into a diameter twice, and not into an axis.
     pub common_sigma: f64,
+    /// Standard deviation of a displacement that all observations have in common, along each axis, m: the place of the scan. It goes into
+    /// the place of what is fitted in full, into no size and no direction.
+    pub shift_sigma: f64,
     /// How well the axis of the first guess is known before, rad in each of two directions; `None`: not at all. A hole in
     /// thin metal has its axis from the plane around it.
     pub axis_sigma: Option<f64>,
@@ -33,7 +36,7 @@ pub struct FitParams {
 
 impl Default for FitParams {
     fn default() -> Self {
-        Self { common_sigma: 0.0, axis_sigma: None, rejection: 4.0 }
+        Self { common_sigma: 0.0, shift_sigma: 0.0, axis_sigma: None, rejection: 4.0 }
     }
 }
 
@@ -43,8 +46,10 @@ fn positive(what: &'static str, sigma: f64) -> Result<(), FitError> {
 
 impl FitParams {
     pub(super) fn check(&self) -> Result<(), FitError> {
-        if !(self.common_sigma >= 0.0 && self.common_sigma.is_finite()) {
-            return Err(FitError::BadSigma { what: "common_sigma", sigma: self.common_sigma });
+        for (what, sigma) in [("common_sigma", self.common_sigma), ("shift_sigma", self.shift_sigma)] {
+            if !(sigma >= 0.0 && sigma.is_finite()) {
+                return Err(FitError::BadSigma { what, sigma });
+            }
         }
         positive("rejection", self.rejection)?;
         self.axis_sigma.map_or(Ok(()), |sigma| positive("axis_sigma", sigma))

@@ -146,9 +146,8 @@ impl Surface for Stadium {
 }
 
 impl Fit<Stadium> {
-    /// By how much the middle may be off, m: across it, and along it where its ends determine that.
+    /// By how much the middle may be off across it and along it, m; `None` where its ends do not determine where it is along.
     pub(crate) fn middle_std(&self) -> Option<f64> {
-        let across = self.std(Freedom::Y)?;
-        Some(self.std(Freedom::X).map_or(across, |along| across.hypot(along)))
+        Some(self.std(Freedom::Y)?.hypot(self.std(Freedom::X)?))
     }
 }
