@@ -16,6 +16,7 @@ mod doctor;
 mod error;
 mod features;
 mod found;
+mod init;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
 mod offsets;
@@ -98,6 +99,8 @@ enum Verb {
     Disagree(disagree::DisagreeArguments),
     /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that it touched
     Doctor(doctor::DoctorArguments),
+    /// Writes a scene with every key explained
+    Init(init::InitArguments),
     /// Refines a scan by a recording of touches
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
@@ -166,6 +169,7 @@ impl Verb {
             Self::Demo(arguments) => demo::demo(arguments),
             Self::Disagree(arguments) => disagree::disagree(arguments),
             Self::Doctor(arguments) => doctor::doctor(arguments),
+            Self::Init(arguments) => init::init(arguments),
             Self::Refine(arguments) => refine::refine(arguments),
             Self::Features(arguments) => features::features(arguments),
             Self::Probe(arguments) => probe::probe(arguments),

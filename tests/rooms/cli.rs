@@ -483,6 +483,33 @@ fn demo_that_cannot_write_is_1() {
     assert!(text(&output.stderr).contains("file") && text(&output.stderr).lines().count() == 1);
 }
 
+// ---- init -------------------------------------------------------------------------------------------------------
+
+/// A scene that `init` writes is taken as it is, and each of its sources is the scene.
+#[test]
+fn init_writes_a_scene_that_refine_takes() {
+    let case = Case::new();
+    let [scene, bag, out] = ["cell.yaml", "touch.mcap", "out.ply"].map(|name| case.path(name).display().to_string());
+    let untold = touchup(&["init", &scene], "");
+    assert!(code(&untold) == 2 && text(&untold.stderr).contains("--tip-radius-mm"), "{}", text(&untold.stderr));
+    let init = ["init", &scene, "--tip-radius-mm", "1.4", "--scan", "scan.ply", "--scan-noise-mm", "0.25"];
+    let made = touchup(&init, "");
+    assert_eq!((code(&made), text(&made.stderr)), (0, ""));
+    let written = fs::read_to_string(&scene).unwrap();
+    let default_yaml = include_str!("../../config/default.yaml");
+    let keys = default_yaml.lines().filter(|line| !line.contains("radius_mm: 1.5") && !line.contains("noise_mm: 0.6"));
+    assert!(keys.filter(|line| !line.starts_with("  #file")).all(|line| written.contains(line)), "{written}");
+    let again = touchup(&init, "");
+    assert!(code(&again) == 2 && text(&again.stderr).contains("is there already"), "{}", text(&again.stderr));
+    assert_eq!(fs::read_to_string(&scene).unwrap(), written);
+    let summary = json(&touchup(&["refine", "--scene", &scene, "--bag", &bag, "--out", &out, "--json"], ""));
+    let told = |value: f64| serde_json::json!({ "value": value, "source": "scene" });
+    assert_eq!(summary["told"]["tip_radius_mm"], told(1.4));
+    assert_eq!(summary["told"]["scan_noise_mm"], told(0.25));
+    let bad = touchup(&["init", &case.path("bad.yaml").display().to_string(), "--tip-radius-mm", "-1"], "");
+    assert!(code(&bad) == 2 && text(&bad.stderr).contains("tip.radius_mm is -1") && !case.path("bad.yaml").exists());
+}
+
 // ---- simulate ---------------------------------------------------------------------------------------------------
 
 /// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the error as poses do.

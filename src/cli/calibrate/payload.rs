@@ -136,7 +136,7 @@ impl PayloadArguments {
         let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
         let recording = self.source.open(path)?;
         let recorded = recording.wrench_frame;
-        let replayed = self.source.replay(recording, &draft.reading(), |sample| finder.push(sample))?;
+        let replayed = self.source.replay(recording, &draft.scene, |sample| finder.push(sample))?;
         Ok((finder.finish(), named.unwrap_or(recorded), replayed.losses))
     }
 }

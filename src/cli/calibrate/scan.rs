@@ -57,9 +57,10 @@ impl ScanArguments {
     /// The points of the file, each with the place where the stylus dwelled.
     fn touched_pairs(&self, bag: &Path, draft: &DraftScene) -> Result<(PairsFile, Losses), CliError> {
         check_kept("--bag", bag, &self.target.out)?;
+        draft.require_radius()?;
         let mut file = read_scan_points(&self.pairs)?;
         // the poses stay in space: that is what is looked for
-        let scene = Scene { scan_to_space: None, ..draft.reading() };
+        let scene = Scene { scan_to_space: None, ..draft.scene.clone() };
         let tip = scene.tip_params();
         let mut finder = DwellFinder::new(DwellParams { radius: tip.radius, ..DwellParams::default() });
         let recording = self.source.open(bag)?;

@@ -7,17 +7,20 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::{CliError, check_kept, not_written, print_report};
+use crate::cli::{CliError, check_kept, not_written, print_report, require};
 use crate::io::atomic::write_atomically;
 use crate::scene::{Scene, Setting};
 
 /// Error of a calibration with an arm but without a scene.
 const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
 
+const NO_RADIUS: &str = "the radius of the ball is not known: give a scene with tip.radius_mm (touchup init)";
+
 /// Where the result goes, and how it is printed.
 #[derive(Debug, Args)]
 pub(super) struct CalibrationTarget {
-    /// The scene to put the result into: all else in it stays as written. Default: a new file
+    /// The scene to put the result into: all else in it stays as written. Default, and where --out is the same and no file yet: a whole
+    /// scene with every key explained
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     /// Where the scene goes; may be the one that --scene names
@@ -36,9 +39,9 @@ pub(super) struct DraftScene {
 }
 
 impl DraftScene {
-    /// The settings by which a recording is read: those of the scene, or the default ones where there is none.
-    pub fn reading(&self) -> Scene {
-        if self.text.is_empty() { Scene::default() } else { self.scene.clone() }
+    /// Refuses a scene that does not tell the radius of the ball.
+    pub fn require_radius(&self) -> Result<(), CliError> {
+        require(Scene::names(&self.text, "tip", "radius_mm"), NO_RADIUS)
     }
 }
 
@@ -51,10 +54,11 @@ impl CalibrationTarget {
 
     /// Reads the scene.
     fn open_scene(&self) -> Result<DraftScene, CliError> {
-        let Some(path) = &self.scene else {
-            return Ok(DraftScene { text: String::new(), scene: Scene::from_yaml("{}")? });
+        let is_new = |path: &PathBuf| *path == self.out && path.symlink_metadata().is_err();
+        let (scene, text) = match self.scene.as_ref().filter(|path| !is_new(path)) {
+            Some(path) => Scene::read_with_text(path)?,
+            None => (Scene::default(), Scene::template_without_radius()),
         };
-        let (scene, text) = Scene::read_with_text(path)?;
         Ok(DraftScene { text, scene })
     }
 
@@ -68,21 +72,11 @@ impl CalibrationTarget {
     pub fn write(&self, draft: &DraftScene, found: &impl Calibrated) -> Result<(), CliError> {
         let mut expected = draft.scene.clone();
         let (settings, remark) = found.set_in(&mut expected);
-        let start = match draft.text.as_str() {
-            "" => format!("{}\n", new_file(found)),
-            text => text.to_owned(),
-        };
-        let text = Scene::edited(&start, &settings, &remark, &expected)?;
+        let text = Scene::edited(&draft.text, &settings, &remark, &expected)?;
         write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
         print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()))?;
         Ok(())
     }
-}
-
-/// The source of the result, as comments above it.
-fn new_file(found: &impl Display) -> String {
-    let lines = format!("Made by `touchup calibrate`; one section of a scene: put it into yours.\n\n{found}");
-    lines.lines().map(|line| format!("# {line}").trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
 /// The result of a calibration, as it is printed, and what it changes in a scene.

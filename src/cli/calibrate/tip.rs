@@ -77,7 +77,7 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
     let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
-    let mut scene = draft.reading();
+    let mut scene = draft.scene.clone();
     // the poses as they are recorded: an older offset does not count
     scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;

@@ -254,9 +254,17 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
     let report = done(&output);
     assert!(report.contains("residual, mm") && report.contains("rms 0.000 mm") && report.contains(&out), "{report}");
     let new = fs::read_to_string(&out).unwrap();
-    assert!(new.starts_with("# Made by `touchup calibrate`") && new.contains("\n# E "), "{new}");
     assert!(new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"), "{new}");
-    assert!(touchup::scene::Scene::read(Path::new(&out)).unwrap().scan_to_space.is_some());
+    // a whole scene, but for the radius of the ball, which nobody has told
+    let scene = touchup::scene::Scene::read(Path::new(&out)).unwrap();
+    assert!(scene.scan_to_space.is_some());
+    assert_eq!(touchup::scene::Scene { scan_to_space: None, ..scene }, touchup::scene::Scene::default());
+    assert!(!touchup::scene::Scene::names(&new, "tip", "radius_mm") && new.contains("#radius_mm"), "{new}");
+    // the same of a scene that is named and not there yet
+    let named = name("named.yaml");
+    let scan_named = ["calibrate", "scan", "--pairs", &pairs, "--scene", &named, "--out", &named];
+    done(&touchup(&scan_named));
+    assert_eq!(fs::read_to_string(&named).unwrap(), new);
 
     let refused = |output: Output, exit: i32, named: &str| {
         let report = text(&output.stderr);

@@ -1,7 +1,8 @@
 //! One seed of one world: scan and recording in memory, refined as `touchup refine` does.
 
+use super::kind::CoverageKind;
+use super::stated::StatedNumber;
 use super::truth::{feature_numbers, vertex_kind};
-use super::{CoverageKind, StatedNumber};
 use crate::error::{MeasureError, Measured};
 use touchup_core::mesh::{FaceTree, VertexId};
 use touchup_core::reconstruct::{Patched, Patcher};

@@ -6,12 +6,15 @@
 
 mod case;
 mod kind;
+mod stated;
 mod text;
 mod truth;
 
 use std::ops::RangeInclusive;
 
 pub use kind::CoverageKind;
+use stated::SIGMAS_95;
+pub use stated::StatedNumber;
 
 use super::Effort;
 use touchup_sim::SimWorld;
@@ -38,29 +41,6 @@ impl CoverageParams {
     }
 }
 
-/// A number that was stated, beside the truth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StatedNumber {
-    /// stated less true, m
-    pub error: f64,
-    /// stated standard deviation, m; 0: none
-    pub std: f64,
-    /// whether it was stated as a lower bound
-    pub is_at_least: bool,
-}
-
-impl StatedNumber {
-    /// Error over stated standard deviation; `None` for a bound, and where none is stated.
-    pub fn score(&self) -> Option<f64> {
-        (!self.is_at_least && self.std > 0.0).then(|| self.error / self.std)
-    }
-
-    /// Whether the truth is below a stated lower bound by more than what is known of that.
-    fn contradicts(&self) -> bool {
-        self.is_at_least && self.error > SIGMAS_95 * self.std
-    }
-}
-
 /// The numbers of one kind in one world, over all seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KindInWorld {
@@ -83,8 +63,6 @@ pub struct Coverage {
     pub failed: Vec<String>,
 }
 
-/// Standard deviations that hold 95 % of a normal distribution.
-const SIGMAS_95: f64 = 1.96;
 /// The root mean square of error over stated standard deviation is to be within these.
 pub const HONEST: [f64; 2] = [0.8, 1.25];
 

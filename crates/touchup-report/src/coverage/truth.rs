@@ -2,7 +2,8 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
-use super::{CoverageKind, StatedNumber};
+use super::kind::CoverageKind;
+use super::stated::StatedNumber;
 use touchup_core::features::{Feature, FittedTo, Kind, Measured};
 use touchup_core::reconstruct::Support;
 use touchup_sim::{Plate, Surface, SurfacePoint, TruthFeature, TruthShape};

@@ -30,6 +30,11 @@ impl Scene {
         Self::parameters().iter().fold(HEAD.to_owned(), |text, section| text + "\n" + &explained(section, 0, false))
     }
 
+    /// The same without the radius of the ball, which nobody has told yet.
+    pub fn template_without_radius() -> String {
+        Self::template().replace("\n  radius_mm: ", "\n  #radius_mm: ")
+    }
+
     /// Every key with unit, range and default, as Markdown.
     pub fn table() -> String {
         Self::parameters().iter().fold(TABLE_HEAD.to_owned(), |text, section| text + &rows(section))
