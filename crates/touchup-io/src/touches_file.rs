@@ -12,12 +12,11 @@ use touchup_core::stylus::ProbedPoint;
 ///
 /// `touch`: its number, from 0 on, which features name; `stamp_ns`: of the sample it came from; `stroke`; the centre of the
 /// ball and its radius (0 where the tip is none); the point of the surface and its outward normal; the standard deviations
-/// along the normal of what averages out and of what does not; what it counts; whether it was rejected as an outlier.
+/// along the normal of what averages out, of what radius and stiffness leave and of the place of the scan; what it counts; whether it was
+/// rejected as an outlier.
 pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z_mm,tip_radius_mm,point_x_mm,point_y_mm,\
-                          point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,weight,rejected";
-
-/// What the last column was called once, and what it is called.
-const RENAMED: (&str, &str) = ("held_apart", "rejected");
+                          point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,place_mm,weight,\
+                          rejected";
 
 /// Why a file of touches could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -30,16 +29,6 @@ pub enum TouchesFileError {
     NoTouches {
         /// the file
         path: PathBuf,
-    },
-    /// The header that was written before a column had its present name.
-    #[error("{}: the column {old} is called {new} now: change that name in the first line", path.display())]
-    OldColumn {
-        /// the file
-        path: PathBuf,
-        /// what it was called
-        old: &'static str,
-        /// what it is called
-        new: &'static str,
     },
     /// A line that is no touch.
     #[error("{}, line {line}: {what}", path.display())]
@@ -72,13 +61,14 @@ pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
 }
 
 fn line_of(touch: &ProbedPoint, number: usize) -> String {
-    let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, .. } = touch;
+    let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, place, weight, .. } = touch;
     let triple = |v: Vector3<f64>| format!("{:.6},{:.6},{:.6}", v.x, v.y, v.z);
     let [centre, point, normal] = [centre.coords * 1e3, point.coords * 1e3, *normal].map(triple);
-    let [radius, sigma, calibration] = [radius, sigma, calibration].map(|length| length * 1e3);
+    let [radius, sigma, calibration, place] = [radius, sigma, calibration, place].map(|length| length * 1e3);
     let rejected = u8::from(touch.is_rejected);
     format!(
-        "{number},{stamp_ns},{stroke},{centre},{radius},{point},{normal},{sigma:.6},{calibration:.6},{weight:.4},{rejected}"
+        "{number},{stamp_ns},{stroke},{centre},{radius},{point},{normal},{sigma:.6},{calibration:.6},{place:.6},{weight:.4},\
+         {rejected}"
     )
 }
 
@@ -93,14 +83,7 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let mut lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
     let header = lines.next().map(str::trim_end).unwrap_or_default();
     if header != HEADER {
-        let (old, new) = RENAMED;
-        let is_old = header.strip_suffix(old).is_some_and(|rest| HEADER.strip_suffix(new) == Some(rest));
-        let path = own();
-        return Err(if is_old {
-            TouchesFileError::OldColumn { path, old, new }
-        } else {
-            TouchesFileError::NoTouches { path }
-        });
+        return Err(TouchesFileError::NoTouches { path: own() });
     }
     let mut touches: Vec<ProbedPoint> = Vec::new();
     for (at, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
@@ -153,8 +136,9 @@ fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
         normal,
         sigma: not_negative(13)? * 1e-3,
         calibration: not_negative(14)? * 1e-3,
-        weight: not_negative(15)?,
-        is_rejected: match integer(16)? {
+        place: not_negative(15)? * 1e-3,
+        weight: not_negative(16)?,
+        is_rejected: match integer(17)? {
             0 => false,
             1 => true,
             other => return Err(format!("rejected is {other}, neither 0 nor 1")),

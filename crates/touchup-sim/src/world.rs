@@ -149,14 +149,14 @@ pub struct Told {
 }
 
 impl Told {
-    /// Standard deviation along a normal of what radius, offset and place of the scan leave, m.
+    /// Standard deviation along an axis of what the offset of the tip and the place of the scan leave, m.
     ///
     /// - `lever`: root mean square distance of the surface from O's origin, m.
-    pub fn calibration_std(&self, lever: f64) -> f64 {
-        let CalibrationStds { radius, tip_offset, shift, turn, .. } = self.stds;
+    pub fn place_std(&self, lever: f64) -> f64 {
+        let CalibrationStds { tip_offset, shift, turn, .. } = self.stds;
         // of the turn's axis and the lever, two of three directions move a point, one of three along the normal
         let turned = turn * lever * (2.0f64 / 3.0).sqrt();
-        [radius, tip_offset, shift, turned].into_iter().fold(0.0, f64::hypot)
+        tip_offset.hypot(shift).hypot(turned)
     }
 }
 
@@ -483,10 +483,11 @@ impl DrawnWorld {
         let mm = |v: &[f64]| format!("{:?}", v.iter().map(|x| x * 1e3).collect::<Vec<_>>());
         let place = told.scan_to_space.translation.vector;
         let turn = told.scan_to_space.rotation.coords;
-        // what a light force is told from: six deviations of the noise and what steps and play of the sensor add
-        let on_n = 0.4f64.max(6.0 * sensor.force_noise + sensor.force_play + sensor.force_step);
-        // … and what may be left of the zero
-        let free_n = 0.15f64.max(3.0 * told.stds.tare + sensor.force_play + sensor.force_step);
+        // what may be left of the zero in all three axes together, and what the noise adds to it
+        let per_axis = 2.0 * told.stds.tare + sensor.force_bias + sensor.force_play + sensor.force_step / 2.0;
+        let free_n = 0.15f64.max(3f64.sqrt() * per_axis);
+        let off_n = 0.22f64.max(free_n + 3.0 * sensor.force_noise);
+        let on_n = 0.4f64.max(off_n + 3.0 * sensor.force_noise);
         let gap_ms = 30f64.max(2.5e3 / sensor.pose_rate);
         format!(
             "# What is told of world {world}, seed {seed}; truth.json has the truth beside it.\n\
@@ -501,7 +502,7 @@ impl DrawnWorld {
              sliding:\n\
              carve:\n  tolerance_mm: {tolerance}\n\
              guard:\npatch:\n\
-             uncertainty:\n  calibration_mm: {calibration}\n  stiffness_percent: {stiffness_std}\n\
+             uncertainty:\n  radius_sigma_mm: {radius_std}\n  place_sigma_mm: {place_std}\n  stiffness_percent: {stiffness_std}\n\
              refine:\n",
             world = self.world.name(),
             seed = self.seed,
@@ -509,18 +510,19 @@ impl DrawnWorld {
             place = mm(place.as_slice()),
             turn = [turn.x, turn.y, turn.z, turn.w],
             tare = [told.tare.x, told.tare.y, told.tare.z],
-            off_n = 0.55 * on_n,
             tip = mm(told.tip_offset.as_slice()),
             radius = told.radius * 1e3,
             stiffness = told.stiffness / 1e3,
             noise = told.scan_noise * 1e3,
             tolerance = 1e3 * sensor.pose_noise.max(0.05e-3),
-            calibration = told.calibration_std(lever) * 1e3,
+            radius_std = told.stds.radius * 1e3,
+            // where poses wander slowly, so does the scan
+            place_std = told.place_std(lever).hypot(sensor.pose_wander) * 1e3,
             stiffness_std = self.stiffness_std() * 100.0,
         )
     }
 
-    /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of [`Told::calibration_std`].
+    /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of [`Told::place_std`].
     pub fn lever(surface: &dyn Surface) -> f64 {
         let bounds = surface.bounds();
         let corner = |i: usize| {

@@ -28,14 +28,26 @@ prop_compose! {
     fn touch()(
         places in (point(), point(), normal()),
         radius in prop_oneof![Just(0.0), Just(1.5e-3), 1e-4..1e-2],
-        sigmas in [0.0..1e-3f64, 0.0..1e-3],
+        sigmas in [0.0..1e-3f64, 0.0..1e-3, 0.0..1e-3],
         weight in 0.0..1.0,
         is_rejected: bool,
         later in 0..1_000_000_000_000i64,
         stroke in 0..2u32,
     ) -> ProbedPoint {
-        let ((centre, point, normal), [sigma, calibration]) = (places, sigmas);
-        ProbedPoint { stamp_ns: later, stroke, centre, radius, point, normal, sigma, calibration, weight, is_rejected }
+        let ((centre, point, normal), [sigma, calibration, place]) = (places, sigmas);
+        ProbedPoint {
+            stamp_ns: later,
+            stroke,
+            centre,
+            radius,
+            point,
+            normal,
+            sigma,
+            calibration,
+            place,
+            weight,
+            is_rejected,
+        }
     }
 }
 
@@ -66,7 +78,8 @@ proptest! {
             prop_assert!((a.centre - b.centre).amax() < length && (a.point - b.point).amax() < length);
             prop_assert!((a.radius - b.radius).abs() <= 1e-15 * b.radius, "a radius is written in full");
             prop_assert!((a.normal - b.normal).amax() < share && (a.normal.norm() - 1.0).abs() < 1e-15);
-            prop_assert!((a.sigma - b.sigma).abs() < length && (a.calibration - b.calibration).abs() < length);
+            let sigmas = |t: &ProbedPoint| Vector3::new(t.sigma, t.calibration, t.place);
+            prop_assert!((sigmas(a) - sigmas(b)).amax() < length);
             prop_assert!((a.weight - b.weight).abs() < weight);
         }
         prop_assert_eq!(read, as_written(&touches));
@@ -84,7 +97,7 @@ proptest! {
                 let places = [touch.centre.coords, touch.point.coords, touch.normal];
                 prop_assert!(places.iter().flatten().all(|x| x.is_finite()), "{touch:?}");
                 prop_assert!((touch.normal.norm() - 1.0).abs() < 1e-15, "{touch:?}");
-                let sizes = [touch.radius, touch.sigma, touch.calibration, touch.weight];
+                let sizes = [touch.radius, touch.sigma, touch.calibration, touch.place, touch.weight];
                 prop_assert!(sizes.iter().all(|x| x.is_finite() && *x >= 0.0), "{touch:?}");
             }
             Err(TouchesFileError::BadLine { line, what, .. }) => prop_assert!(line == 2 && !what.is_empty(), "{what}"),
@@ -99,8 +112,8 @@ fn read(text: &str) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     read_touches(file.path())
 }
 
-const GOOD: [&str; 17] =
-    ["0", "1000", "3", "1.5", "-2", "3e0", "1.5", "1", "2", "3", "0", "0", "1", "0.01", "0.002", "0.5", "1"];
+const GOOD: [&str; 18] =
+    ["0", "1000", "3", "1.5", "-2", "3e0", "1.5", "1", "2", "3", "0", "0", "1", "0.01", "0.002", "0.003", "0.5", "1"];
 
 /// A line with some fields changed.
 fn line(changed: &[(usize, &str)]) -> String {
@@ -121,6 +134,7 @@ fn a_line_is_read_by_its_columns() {
         normal: Vector3::z(),
         sigma: 1e-5,
         calibration: 2e-6,
+        place: 3e-6,
         weight: 0.5,
         is_rejected: true,
     };
@@ -145,20 +159,13 @@ fn marks_of_other_programs_are_passed_over() {
 }
 
 #[test]
-fn the_old_name_of_a_column_is_named_with_the_new_one() {
-    let old = HEADER.replace("rejected", "held_apart");
-    let error = read(&format!("{old}\n{}\n", line(&[]))).unwrap_err().to_string();
-    assert!(error.contains("the column held_apart is called rejected now"), "{error}");
-}
-
-#[test]
 fn damaged_lines_are_named() {
     let two = |second: &str| format!("{HEADER}\n{}\n{second}\n", line(&[]));
     let later = |changed: &[(usize, &str)]| two(&line(&[&[(0, "1")], changed].concat()));
     let whole = line(&[(0, "1")]);
     let cases = [
-        (two(whole.rsplit_once(',').unwrap().0), 3, "16 fields"),
-        (two(&format!("{whole},0")), 3, "18 fields"),
+        (two(whole.rsplit_once(',').unwrap().0), 3, "17 fields"),
+        (two(&format!("{whole},0")), 3, "19 fields"),
         (two(&whole.replace(',', ";")), 3, "1 fields"),
         (two(&line(&[(0, "2")])), 3, "touch 2 where 1 comes"),
         (two(&line(&[])), 3, "touch 0 where 1 comes"),
@@ -173,14 +180,15 @@ fn damaged_lines_are_named() {
         (later(&[(4, "NaN")]), 3, "center_y_mm \"NaN\""),
         (later(&[(7, "inf")]), 3, "point_x_mm \"inf\""),
         (later(&[(9, "")]), 3, "point_z_mm \"\""),
-        (later(&[(9, "1,5")]), 3, "18 fields"),
+        (later(&[(9, "1,5")]), 3, "19 fields"),
         (later(&[(6, "-1.5")]), 3, "tip_radius_mm is -1.5"),
         (later(&[(12, "0")]), 3, "normal"),
         (later(&[(13, "-0.1")]), 3, "sigma_mm"),
         (later(&[(14, "-0.1")]), 3, "calibration_mm"),
-        (later(&[(15, "-0.1")]), 3, "weight"),
-        (later(&[(16, "2")]), 3, "rejected"),
-        (later(&[(16, "yes")]), 3, "rejected"),
+        (later(&[(15, "-0.1")]), 3, "place_mm"),
+        (later(&[(16, "-0.1")]), 3, "weight"),
+        (later(&[(17, "2")]), 3, "rejected"),
+        (later(&[(17, "yes")]), 3, "rejected"),
     ];
     for (text, at, named) in &cases {
         match read(text) {

@@ -33,7 +33,8 @@ fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
     let (PlateStream { scan, noise, samples }, _) = plate_stream(&stylus, seed);
     let (radius, stiffness) = (stylus.radius + off.radius, stylus.stiffness * (1.0 + off.stiffness));
     let mut params = PatcherParams::new(radius, Some(stiffness), noise);
-    params.uncertainty.as_mut().unwrap().calibration = CalibrationParams { position: 2e-6, stiffness_share: 0.02 };
+    params.uncertainty.as_mut().unwrap().calibration =
+        CalibrationParams { radius: 2e-6, place: 0.0, stiffness_share: 0.02 };
     let mut patcher = Patcher::new(params).unwrap();
     contacts_of(radius, Some(stiffness), &samples).iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
@@ -269,6 +270,7 @@ fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
         sigma: 0.02e-3,
         weight: 1.0,
         calibration: 2e-6,
+        place: 0.0,
         stroke: number as u32,
         stamp_ns: number * 1_000_000_000,
         is_rejected: false,

@@ -58,7 +58,8 @@ guard.smallest_fold_cosine - -0.85 -1 1
 guard.gap_edges edges 0.01 0 1
 patch.pitch_mm mm - 0.001 1000
 patch.most_faces scan 10 1 1e6
-uncertainty.calibration_mm mm 0.002 0 1000
+uncertainty.radius_sigma_mm mm 0.001 0 1000
+uncertainty.place_sigma_mm mm 0.002 0 1000
 uncertainty.stiffness_percent % 2 0 100
 uncertainty.gate_sigmas deviations 4 0.5 1e6
 robot.payload_kg kg 0.25 0 50

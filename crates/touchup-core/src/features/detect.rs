@@ -90,29 +90,42 @@ fn is_sure_plane(parted: &Parted, number: usize) -> bool {
     segment.is_exact || segment.area > (SURE_WIDTH * segment.tolerance).powi(2)
 }
 
-/// Where an axis meets a plane, or ends; its uncertainty is along the axis.
-type AxisEnd = Measured<Point3<f64>>;
+/// Where an axis meets a plane, or ends.
+#[derive(Clone, Debug, Default)]
+struct AxisEnd {
+    /// the place; its uncertainty is along the axis
+    place: Measured<Point3<f64>>,
+    /// standard deviation along the axis without what all touches have in common, m
+    own_std: Option<f64>,
+    /// what its touches have in common along the axis, m
+    systematic: f64,
+}
 
-/// Distance of two places along `direction`, each with its uncertainty.
+/// Share of what the touches of one plane have in common that those of another have not: poses wander slowly, and the stylus leans otherwise.
+const NOT_ALIKE: f64 = 0.33;
+
+/// Distance of two parallel ends along `direction`, each with its uncertainty.
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
-    let std = from.std.zip(to.std).map(|(a, b)| a.hypot(b));
-    let touches = distinct(from.touches.iter().chain(&to.touches).copied());
-    Measured { value: (from.value - to.value).dot(direction).abs(), std, touches, ..Measured::default() }
+    // touched from one side, both are off alike by most of what touches have in common
+    let common = NOT_ALIKE * from.systematic.hypot(to.systematic);
+    let std = from.own_std.zip(to.own_std).map(|(a, b)| a.hypot(b).hypot(common));
+    let touches = distinct(from.place.touches.iter().chain(&to.place.touches).copied());
+    Measured { value: (from.place.value - to.place.value).dot(direction).abs(), std, touches, ..Measured::default() }
 }
 
 /// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a guess: then it is as far as the
 /// wall was felt, and a lower bound.
 fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd, out: &Vector3<f64>) -> Measured<f64> {
-    let is_felt = [from, to].map(|end| !end.touches.is_empty());
+    let is_felt = [from, to].map(|end| !end.place.touches.is_empty());
     if fitted.to == FittedTo::Mesh || is_felt == [true; 2] {
         return between(from, to, out);
     }
-    let side = (to.value - from.value).dot(out).signum();
-    let along = |point: &Point3<f64>| (point - from.value).dot(out) * side;
+    let side = (to.place.value - from.place.value).dot(out).signum();
+    let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
     let of_wall = fitted.touches.iter().map(|&number| along(&measure.observed.touch(number).point));
     let (lowest, highest) = of_wall.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
     let begin = if is_felt[0] { 0.0 } else { lowest };
-    let end = if is_felt[1] { along(&to.value) } else { highest };
+    let end = if is_felt[1] { along(&to.place.value) } else { highest };
     Measured {
         value: (end - begin).max(0.0),
         touches: fitted.touches.clone(),
@@ -124,16 +137,21 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
 impl AxisEnd {
     /// Where the axis meets plane number `plane`; else `point`.
     fn on(measure: &Measure, plane: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
-        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| fitted.met(point, axis));
-        met.unwrap_or_else(|| Self { value: *point, ..Self::default() })
+        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| {
+            let place = fitted.met(point, axis)?;
+            let own_std = fitted.confirmed().and_then(|fit| fit.own_std_at(&place.value));
+            let [common, shift] = measure.observed.systematic(&place.touches);
+            Some(Self { place, own_std, systematic: common.hypot(shift) })
+        });
+        met.unwrap_or_else(|| Self { place: Measured { value: *point, ..Measured::default() }, ..Self::default() })
     }
 
     /// As the place of a feature with a fitted surface.
     ///
     /// - `std`: of the place, from the fit, m.
-    fn centre<S: Surface>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Self {
-        let touches = distinct(fitted.touches.iter().chain(&self.touches).copied());
-        Self { value: self.value, std: fitted.confirmed().and_then(std), touches, ..Self::default() }
+    fn centre<S: Surface>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Measured<Point3<f64>> {
+        let touches = distinct(fitted.touches.iter().chain(&self.place.touches).copied());
+        Measured { value: self.place.value, std: fitted.confirmed().and_then(std), touches, ..Measured::default() }
     }
 }
 
@@ -145,8 +163,8 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let bottom = fitted.surface.nearest_on_axis(&(hole.opening - hole.out * hole.depth));
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value);
     // beside a wall that was touched, a floor that was not may be a guess
-    let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.touches.is_empty();
-    let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.value));
+    let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.place.touches.is_empty();
+    let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.place.value));
     let touched = measure.observed.touched_share(&wall.segments);
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
@@ -192,7 +210,7 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let foot = AxisEnd::on(measure, Some(boss.base), &foot, &axis.value);
     let top = fitted.surface.nearest_on_axis(&(boss.foot + boss.out * boss.height));
     let top = AxisEnd::on(measure, boss.top, &top, &axis.value);
-    let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.value));
+    let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.place.value));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
@@ -234,7 +252,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         axis: Some(axis),
         through: Some(slot.through),
         walls: Some(Walls::Slot(fitted.surface)),
-        points: vec![opening.value - half, opening.value + half],
+        points: vec![opening.place.value - half, opening.place.value + half],
         ..Feature::new(kind, centre, touched, fitted.to)
     }
 }

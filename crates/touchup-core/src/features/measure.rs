@@ -11,6 +11,7 @@ use super::observe::Observed;
 use super::slots::Slot;
 use super::walls::Wall;
 use crate::numeric::{order_statistic, spreads, tangent_basis};
+use crate::stylus::ProbedPoint;
 
 /// A fitted surface and what it was fitted to.
 #[derive(Clone, Debug)]
@@ -42,8 +43,20 @@ const PARTS: usize = 24;
 const SHORT: f64 = 0.35;
 /// A touch beside the outline of a slot by less than this share of its width is of it.
 const BESIDE: f64 = 0.15;
+/// A touch is of the edge at an end of a wall when it is nearer to it than this, in radii of the ball …
+const OVER_END: f64 = 0.3;
+/// … and its normal leans towards it by more than this, rad: 8°.
+const OVER_END_LEAN: f64 = 0.14;
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
+
+/// Whether the ball touched the edge at an end of a wall: there it is nearer to the axis, or farther from it, than beside the wall.
+fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
+    let along = (touch.point - wall.origin).dot(&wall.axis);
+    let lean = touch.normal.dot(&wall.axis);
+    let to_end = if lean > 0.0 { wall.ends[1] - along } else { along - wall.ends[0] };
+    lean.abs() > OVER_END_LEAN && to_end < OVER_END * touch.radius
+}
 
 impl<'a> Measure<'a> {
     pub fn new(observed: &'a Observed<'a>) -> Self {
@@ -89,6 +102,7 @@ impl<'a> Measure<'a> {
     /// The touches of a wall, where they are enough around it; else none.
     fn touches_around(&self, wall: &Wall) -> Vec<u32> {
         let mut touches = self.observed.touches_of(&wall.segments);
+        touches.retain(|&number| !is_over_end(self.observed.touch(number), wall));
         if touches.len() < LEAST_TOUCHES || self.turn(&touches, wall) < LEAST_TURN {
             touches.clear();
         }
@@ -138,9 +152,8 @@ impl<'a> Measure<'a> {
         of_mesh: &[Observation],
         axis_sigma: Option<f64>,
     ) -> Fitted<S> {
-        // how much of what calibration leaves is of the radius and how much of the frame nobody says: each may be all of it
-        let common_sigma = self.observed.common_sigma(&touches);
-        let params = FitParams { common_sigma, shift_sigma: common_sigma, axis_sigma, ..FitParams::default() };
+        let [common_sigma, shift_sigma] = self.observed.systematic(&touches);
+        let params = FitParams { common_sigma, shift_sigma, axis_sigma, ..FitParams::default() };
         if !touches.is_empty()
             && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)
         {

@@ -102,10 +102,10 @@ impl<'a> Observed<'a> {
         numbers.iter().map(observation).collect()
     }
 
-    /// Error common to all touches, which does not average out, m.
-    pub fn common_sigma(&self, numbers: &[u32]) -> f64 {
-        let sum: f64 = numbers.iter().map(|&number| self.touches[number as usize].calibration).sum();
-        sum / numbers.len().max(1) as f64
+    /// What all touches have in common along their normals, and by how much they are displaced together, m: standard deviations of what
+    /// does not average out.
+    pub fn systematic(&self, numbers: &[u32]) -> [f64; 2] {
+        systematic(numbers.iter().map(|&number| &self.touches[number as usize]))
     }
 
     /// Whether the part was touched anywhere.
@@ -201,6 +201,14 @@ pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
     let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
     let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
     Observation { point: centre, offset: radius, sigma, group }
+}
+
+/// As [`Observed::systematic`].
+pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> [f64; 2] {
+    let (sum, count) = touches.fold(([0.0; 2], 0.0f64), |([common, shift], count), touch| {
+        ([common + touch.calibration, shift + touch.place], count + 1.0)
+    });
+    sum.map(|sum| sum / count.max(1.0))
 }
 
 /// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.

@@ -9,7 +9,7 @@ use super::detect::{Detection, detect};
 use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
 use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
 use super::from_fits::{Touches, axis_of, number};
-use super::observe::{groups, observation};
+use super::observe::{groups, observation, systematic};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
@@ -160,9 +160,9 @@ impl Feature {
         let chosen: Vec<ProbedPoint> = fitted.iter().rev().map(|&number| touches[number as usize]).collect();
         let observations: Vec<_> =
             chosen.iter().zip(groups(&chosen)).map(|(touch, group)| observation(touch, group)).collect();
-        let common_sigma = chosen.iter().map(|touch| touch.calibration).sum::<f64>() / chosen.len() as f64;
+        let [common_sigma, shift_sigma] = systematic(chosen.iter());
         let axis_sigma = Some(AXIS_KNOWN);
-        let params = FitParams { common_sigma, shift_sigma: common_sigma, axis_sigma, ..FitParams::default() };
+        let params = FitParams { common_sigma, shift_sigma, axis_sigma, ..FitParams::default() };
         let is_held = match &self.walls {
             Some(Walls::Round(cylinder)) => {
                 fit(cylinder, &observations, &params).map(|found| self.is_round(&found, &all)).is_ok()

@@ -21,10 +21,19 @@ pub struct ProbedPoint {
     pub normal: Vector3<f64>,
     /// standard deviation of the centre along the normal by what averages out, m; 0 where that is not estimated
     pub sigma: f64,
-    /// … by what the calibration leaves, the same in each touch, m
+    /// … by what the calibration of radius and stiffness leaves, the same in each touch, m
     pub calibration: f64,
+    /// … by what the place of the scan is off, the same displacement in each touch, m
+    pub place: f64,
     /// what it counts beside others, at most 1
     pub weight: f64,
     /// it contradicts earlier contacts there: an outlier, a slip
     pub is_rejected: bool,
+}
+
+impl ProbedPoint {
+    /// Standard deviation of the centre along the normal by all causes, m.
+    pub(crate) fn sigma_along_normal(&self) -> f64 {
+        self.sigma.hypot(self.calibration).hypot(self.place)
+    }
 }

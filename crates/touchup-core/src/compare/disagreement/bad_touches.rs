@@ -66,7 +66,7 @@ pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Resul
 
 /// How far off a touch must be, m.
 fn limit(touch: &ProbedPoint) -> f64 {
-    (SIGMAS * touch.sigma.hypot(touch.calibration)).max(LEAST_OFF)
+    (SIGMAS * touch.sigma_along_normal()).max(LEAST_OFF)
 }
 
 /// Touches of other times near the foot of a touch on the surface, with normals alike.
@@ -97,7 +97,7 @@ fn bad_touches_of(
     against: impl Fn(usize) -> usize,
 ) -> BadTouches {
     let sum: Vector3<f64> = numbers.iter().map(|&at| touches[at].point.coords).sum();
-    let sigmas = |at: usize| off[at] / touches[at].sigma.hypot(touches[at].calibration).max(LEAST_SIGMA);
+    let sigmas = |at: usize| off[at] / touches[at].sigma_along_normal().max(LEAST_SIGMA);
     let worst = numbers.iter().copied().max_by(|a, b| off[*a].abs().total_cmp(&off[*b].abs())).unwrap_or(numbers[0]);
     BadTouches {
         touches: numbers.iter().map(|&at| at as u32).collect(),

@@ -18,6 +18,8 @@ pub struct Fit<M> {
     /// directions in which they are larger than the stated deviations explain; where there are too few groups to ask them, by
     /// the stated ones, stretched by √(χ²/degrees) where that is above 1.
     pub covariance: FreedomMatrix,
+    /// … of it without what all observations have in common: two surfaces touched alike differ by this alone.
+    pub own_covariance: FreedomMatrix,
     /// For each observation whether it was kept.
     pub used: Vec<bool>,
     /// Σ w r² of what was kept, where groups count once.
@@ -42,10 +44,19 @@ impl<M: Surface> Fit<M> {
 
     /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it is not fixed.
     pub(crate) fn std_of(&self, by: &Steps) -> Option<f64> {
+        self.std_in(&self.covariance, by)
+    }
+
+    /// As [`Self::std_of`], without what all observations have in common.
+    pub(crate) fn own_std_of(&self, by: &Steps) -> Option<f64> {
+        self.std_in(&self.own_covariance, by)
+    }
+
+    fn std_in(&self, covariance: &FreedomMatrix, by: &Steps) -> Option<f64> {
         let has_all = (0..by.len()).all(|i| by[i] == 0.0 || M::FREE[i]);
         let scaled = by.component_mul(&self.alone);
         let is_fixed = (self.unknown * scaled).norm() <= KNOWN * scaled.norm();
-        (has_all && is_fixed).then(|| by.dot(&(self.covariance * by)).max(0.0).sqrt())
+        (has_all && is_fixed).then(|| by.dot(&(covariance * by)).max(0.0).sqrt())
     }
 
     /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is not fixed.

@@ -72,4 +72,10 @@ impl Fit<Plane> {
         let (_, by) = self.surface.derivatives(point);
         self.std_of(&by)
     }
+
+    /// As [`Self::std_at`], without what all observations have in common.
+    pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.own_std_of(&by)
+    }
 }

@@ -48,18 +48,16 @@ impl<M: Surface> Fit<M> {
         };
         let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
         let common = deviations * common * params.common_sigma;
-        // displaced together, observations displace across its axis what is fitted to them, whichever part of it they cover; along the
-        // normal of a plane the error in common is that already
+        // displaced together, observations displace what is fitted to them, whichever part of it they cover
         let shift = Steps::from_fn(|i, _| {
-            let is_across = i == Freedom::X as usize || i == Freedom::Y as usize;
-            if is_across && M::FREE[i] { params.shift_sigma * params.shift_sigma } else { 0.0 }
+            let is_place = i <= Freedom::Z as usize;
+            if is_place && M::FREE[i] { params.shift_sigma * params.shift_sigma } else { 0.0 }
         });
-        let covariance = deviations * inner * deviations.transpose()
-            + common * common.transpose()
-            + FreedomMatrix::from_diagonal(&shift);
+        let own_covariance = deviations * inner * deviations.transpose();
+        let covariance = own_covariance + common * common.transpose() + FreedomMatrix::from_diagonal(&shift);
         let alone = units.component_mul(&alone);
         let used: Vec<bool> = kept.iter().map(|k| *k > 0.0).collect();
-        Self { surface, covariance, used, chi_squared, degrees, groups, unknown, alone, deviations }
+        Self { surface, covariance, own_covariance, used, chi_squared, degrees, groups, unknown, alone, deviations }
     }
 
     /// # Errors

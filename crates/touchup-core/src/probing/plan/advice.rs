@@ -117,9 +117,20 @@ mod tests {
                 let out = Vector3::new(angle.cos(), angle.sin(), 0.0);
                 let point = Point3::from(out * 4e-3 - Vector3::z() * *depth);
                 let (stamp_ns, stroke, centre, radius) = (0, 0, point, 0.0);
-                let (sigma, calibration, weight, is_rejected) = (5e-6, 0.0, 1.0, false);
-                let normal = -out;
-                ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, weight, is_rejected }
+                let (sigma, calibration, place, weight, is_rejected) = (5e-6, 0.0, 0.0, 1.0, false);
+                ProbedPoint {
+                    stamp_ns,
+                    stroke,
+                    centre,
+                    radius,
+                    point,
+                    normal: -out,
+                    sigma,
+                    calibration,
+                    place,
+                    weight,
+                    is_rejected,
+                }
             })
             .collect();
         let wall = Cylinder::new(Point3::new(0.0, 0.0, -3e-3), &Vector3::z(), 4e-3, true);

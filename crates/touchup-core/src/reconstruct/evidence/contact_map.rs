@@ -412,7 +412,7 @@ impl ContactMap {
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
         let sums = self.sums(index);
         let (sigma, passes) = (sums.sigma(), sums.passes.count.max(1));
-        sigma.noise * sigma.noise / f64::from(passes) + sigma.calibration * sigma.calibration
+        sigma.noise * sigma.noise / f64::from(passes) + sigma.systematic().powi(2)
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.

@@ -63,8 +63,9 @@ pub(in crate::reconstruct) struct ContactStatistics {
     noise: f64,
     reach: f64,
     tilt: f64,
-    /// Σ w σ of the calibration, m
+    /// Σ w σ of the calibration and of the place, m
     calibration: f64,
+    place: f64,
     pub passes: IndependentPasses,
 }
 
@@ -78,6 +79,7 @@ impl ContactStatistics {
         self.reach += weight * sigma.reach * sigma.reach;
         self.tilt += weight * sigma.normal * sigma.normal;
         self.calibration += weight * sigma.calibration;
+        self.place += weight * sigma.place;
     }
 
     pub fn point(&self) -> Point3<f64> {
@@ -87,7 +89,8 @@ impl ContactStatistics {
     /// Uncertainty of the place by one of the passes that were added.
     pub fn sigma(&self) -> ContactSigma {
         let [noise, reach, tilt] = [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
-        ContactSigma { noise, reach, calibration: self.calibration / self.weight, normal: tilt }
+        let [calibration, place] = [self.calibration, self.place].map(|sum| sum / self.weight);
+        ContactSigma { noise, reach, calibration, place, normal: tilt }
     }
 
     /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. The chord is at right

@@ -11,11 +11,16 @@ parameters! {
     /// What a calibration leaves uncertain; standard deviations.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CalibrationParams in "uncertainty" {
-        /// What is left after calibrating the radius of the tip and the frame of the scan, along the normal; it averages out in no
-        /// number of touches.
+        /// What is left after calibrating the radius of the tip; it averages out in no number of touches, and twice of it is in each
+        /// diameter and width.
         ///
-        /// In m. A ball of ruby is round within 0.2 µm, a gauge block gives the centre within a few.
-        position: f64 = 0.002, "calibration_mm" [MM, 0, 1000];
+        /// In m. A ball of ruby is round within 0.2 µm, and its radius is calibrated within one.
+        radius: f64 = 0.001, "radius_sigma_mm" [MM, 0, 1000];
+        /// What is left after calibrating the centre of the tip and the frame of the scan, along each axis; it averages out in no number
+        /// of touches, and is in each place and in no size.
+        ///
+        /// In m. A gauge block gives the centre within a few µm.
+        place: f64 = 0.002, "place_sigma_mm" [MM, 0, 1000];
         /// What is left after calibrating the stiffness of the tip.
         ///
         /// As a share. A weight of 1 N that bends a stylus by 50 µm, read within 1 µm.
@@ -38,6 +43,13 @@ parameters! {
     }
 }
 
+impl ContactSigma {
+    /// What does not average out, together, m.
+    pub fn systematic(&self) -> f64 {
+        self.calibration.hypot(self.place)
+    }
+}
+
 impl UncertaintyParams {
     /// The defaults, for a scan whose points are off by `noise` (m).
     pub fn new(noise: f64) -> Self {
@@ -52,8 +64,10 @@ pub struct ContactSigma {
     pub noise: f64,
     /// … by how far the ball reaches over the surface where the normal is off, m
     pub reach: f64,
-    /// … by what does not average out, m
+    /// … by what radius and stiffness are off, which does not average out, m
     pub calibration: f64,
+    /// … by what the place of the scan is off, the same displacement in each contact, m
+    pub place: f64,
     /// of the direction of the normal, rad
     pub normal: f64,
 }

@@ -138,6 +138,12 @@ impl NodeState {
 /// anyway.
 const NOTICED: f64 = 0.1;
 
+/// Free space ends a touched surface farther than this from its last contact, in radii …
+const ENDS_FROM: f64 = 0.25;
+/// … and where the ball was deeper in it than this, in radii, and so many standard deviations of the contact.
+const ENDS_MARGIN: f64 = 0.05;
+const ENDS_SIGMAS: f64 = 2.0;
+
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Evidence<'a> {
@@ -230,7 +236,24 @@ impl Evidence<'_> {
                 found.value += off * of_touch / of_both;
             }
         }
+        self.end_at_free_space(&mut found, x);
         Some(found)
+    }
+
+    /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge there, or sank into a hole.
+    fn end_at_free_space(&self, found: &mut FieldValue, x: &Point3<f64>) {
+        let radius = self.params.radius;
+        if found.lateral() < ENDS_FROM * radius {
+            return;
+        }
+        let Some((distance, centre)) = self.free_space.nearest(x) else { return };
+        let margin = ENDS_MARGIN * radius + ENDS_SIGMAS * self.contacts.variance(found.contact).sqrt();
+        let depth = radius - margin - distance;
+        if depth > found.value
+            && let Some(outward) = direction(&(centre - x))
+        {
+            (found.value, found.gradient) = (depth, outward);
+        }
     }
 
     /// The field of the touches where they support the point, else that of the scan where it holds.

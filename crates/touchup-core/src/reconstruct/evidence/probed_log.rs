@@ -89,6 +89,7 @@ impl ProbedLog {
             normal: contact.normal,
             sigma: contact.sigma.noise,
             calibration: contact.sigma.calibration,
+            place: contact.sigma.place,
             weight: contact.weight,
             is_rejected: verdict == Verdict::Rejected,
         });

@@ -255,7 +255,8 @@ impl TouchFinder {
             ContactSigma {
                 noise: (pose * SHARED_POSE).hypot(force),
                 reach: self.params.radius * (1.0 - estimate.sigma.cos()),
-                calibration: calibration.position.hypot(calibration.stiffness_share * bend),
+                calibration: calibration.radius.hypot(calibration.stiffness_share * bend),
+                place: calibration.place,
                 normal: estimate.sigma,
             }
         });

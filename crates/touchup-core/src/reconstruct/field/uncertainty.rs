@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::point_evidence::Evidence;
-use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, PassShare};
+use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, Member, PassShare};
 
 /// Uncertainty of the fit, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,28 +22,38 @@ pub struct FitSigma {
     pub calibration: f64,
     /// contacts that do not lie on one smooth piece
     pub scatter: f64,
-    /// beyond the last contact the surface may turn
-    pub border: f64,
+    /// between contacts and beyond the last one the surface may turn, as much as those around it do
+    pub turning: f64,
     /// another surface is near, and no edge between them was touched
     pub meeting: f64,
+    /// at an edge the surface is as far off as both surfaces that meet there
+    pub edge: f64,
 }
 
 impl FitSigma {
     /// All causes together, m.
     pub fn total(&self) -> f64 {
-        let Self { noise, tilt, calibration, scatter, border, meeting } = *self;
-        [tilt, calibration, scatter, border, meeting].iter().fold(noise, |sum, part| sum.hypot(*part))
+        let Self { noise, tilt, calibration, scatter, turning, meeting, edge } = *self;
+        [tilt, calibration, scatter, turning, meeting, edge].iter().fold(noise, |sum, part| sum.hypot(*part))
     }
 }
 
 /// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if they were independent.
 const SCATTER: f64 = 0.33;
-/// How much a surface may turn beyond its last contact, rad: 3°.
+/// How much a plane may turn beyond its last contact, rad: 3°.
 const TURN: f64 = 0.053;
+/// Where contacts that face otherwise are near, a surface turns before the next contact by this share of the angle between …
+const TURN_SHARE: f64 = 0.6;
+/// … or of this, where the edge that they make is known.
+const TURN_SHARE_AT_EDGE: f64 = 0.35;
+/// A surface turns by what faces otherwise up to so many σ behind the nearest contact.
+const TURN_REACH: f64 = 2.0;
 /// Where two surfaces meet the ball touches both, and the fit is off by up to this share of σ …
 const MEETING: f64 = 0.25;
 /// … when the other is as near as the one; by less and less up to this many σ.
 const MEETING_REACH: f64 = 1.2;
+/// Both surfaces of an edge count where they are as near as each other, by less and less up to this many σ.
+const EDGE_REACH: f64 = 0.5;
 /// A parabola over a window of length T has the variance that noise of correlation time T / 2.25 has.
 const WINDOW_TO_CORRELATION: f64 = 2.25;
 
@@ -72,7 +82,7 @@ impl FieldParams {
             let lateral = (arm.norm_squared() - off * off).max(0.0).sqrt();
             let sums = store.sums(member.index);
             let sigma = sums.sigma();
-            calibration += weight * sigma.calibration;
+            calibration += weight * sigma.systematic();
             scatter += weight * (off - piece.value()).powi(2);
             shares.extend(sums.passes.iter().map(|pass| {
                 let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
@@ -82,15 +92,37 @@ impl FieldParams {
         }
         shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));
         let [noise, tilt] = variances(shares, (window_ns as f64 / WINDOW_TO_CORRELATION) as i64);
-        let nearness = (1.0 - nearest_other / (MEETING_REACH * self.sigma)).max(0.0);
-        FitSigma {
+        let nearness = |reach: f64| (1.0 - nearest_other / (reach * self.sigma)).max(0.0);
+        let share = if found.is_edge { TURN_SHARE_AT_EDGE } else { TURN_SHARE };
+        let turn = (share * self.turn_around(found, store, x, near)).hypot(if found.is_border { TURN } else { 0.0 });
+        let fit = FitSigma {
             noise: noise.sqrt(),
             tilt: tilt.sqrt(),
             calibration,
             scatter: SCATTER * scatter.sqrt(),
-            border: if found.is_border { TURN * found.lateral() } else { 0.0 },
-            meeting: if found.is_edge { 0.0 } else { MEETING * self.sigma * nearness },
+            ..FitSigma::default()
+        };
+        FitSigma {
+            turning: turn * found.lateral(),
+            meeting: if found.is_edge { 0.0 } else { MEETING * self.sigma * nearness(MEETING_REACH) },
+            edge: if found.is_edge { fit.total() * nearness(EDGE_REACH) } else { 0.0 },
+            ..fit
         }
+    }
+
+    /// Root mean square angle between the field at `x` and the contacts around the nearest one, of whichever piece, rad.
+    fn turn_around(&self, found: &FieldValue, store: &ContactMap, x: &Point3<f64>, near: &[Member]) -> f64 {
+        let reach_squared = (found.nearest + TURN_REACH * self.sigma).powi(2);
+        let (mut sum, mut count) = (0.0, 0.0f64);
+        for member in near {
+            let mean = &store.means()[member.index as usize];
+            if (mean.point - x).norm_squared() <= reach_squared {
+                // 2 (1 − cos α) is α², for small ones
+                sum += 2.0 * (1.0 - mean.normal.dot(&found.gradient));
+                count += 1.0;
+            }
+        }
+        (sum / count.max(1.0)).max(0.0).sqrt()
     }
 }
 
@@ -134,7 +166,8 @@ pub(in crate::reconstruct) fn vertex_sigma(
     }
     let (field, radius) = (&evidence.params.field, evidence.params.radius);
     let Some(found) = field.at(evidence.contacts, p, scratch) else {
-        return scan.hypot(guess(field.reach, radius));
+        let from_scan = evidence.scan_at(p).map_or(0.0, |scan| (scan.foot - p).norm());
+        return scan.hypot(guess(field.reach.max(from_scan), radius));
     };
     let fit = field.sigma_of(&found, evidence.contacts, p, window_ns, scratch).total();
     match support {
@@ -164,7 +197,7 @@ mod tests {
         for i in 0..64 * passes {
             let along = (i % 64) as f64 * 0.04e-3 - 1.28e-3;
             let stamp_ns = i / 64 * 1_000_000_000 + i % 64 * spacing_ns;
-            let sigma = ContactSigma { noise: 10e-6, reach: 0.0, calibration: 3e-6, normal: 0.0 };
+            let sigma = ContactSigma { noise: 10e-6, reach: 0.0, calibration: 3e-6, place: 0.0, normal: 0.0 };
             store.add(&SurfaceContact {
                 point: Point3::new(along, 0.1e-3, 0.0),
                 normal: Vector3::z(),
