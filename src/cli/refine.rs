@@ -11,7 +11,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::doctor::{NO_RADIUS, UNSOUND, refuse_unsound};
+use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
@@ -58,7 +58,7 @@ pub(super) struct RefineArguments {
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
-    /// Radius of the ball, mm; needed where no scene names the tip
+    /// Radius of the ball, mm; needed where no scene names it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub tip_radius_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm
@@ -90,9 +90,6 @@ pub(super) struct RefineArguments {
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
-    /// Whether it is a session of the node, which had its scene
-    #[arg(skip)]
-    is_session: bool,
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
@@ -273,7 +270,7 @@ impl RefineArguments {
             let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
             (self.bag, self.wrench_topic, self.pose_topic) = (recording, topics.wrench, topics.pose);
-            (self.strokes, self.is_session) = (strokes, true);
+            self.strokes = strokes;
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
             }
@@ -455,11 +452,8 @@ impl RefineArguments {
             None if Scene::names(&yaml, section, key) => ToldBy::Scene,
             None => ToldBy::Default,
         };
+        scene.tell_radius(&yaml, self.tip_radius_mm)?;
         let radius_by = told_by(self.tip_radius_mm, "tip", "radius_mm");
-        require(radius_by != ToldBy::Default || self.is_session, NO_RADIUS)?;
-        if let Some(radius_mm) = self.tip_radius_mm {
-            scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
-        }
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }

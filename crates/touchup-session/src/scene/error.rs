@@ -43,6 +43,11 @@ pub enum SceneError {
         /// section and key
         needs: &'static str,
     },
+    /// Neither a flag nor the scene tells the radius of the ball.
+    #[error(
+        "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene (`touchup init` writes one)"
+    )]
+    NoRadius,
     /// A file whose form cannot be edited without harm to the rest of it.
     #[error("the scene cannot be edited ({why}); put this in by hand: {settings}")]
     CannotEdit {

@@ -121,6 +121,21 @@ impl Scene {
         scene.get(section).and_then(|section| section.get(key)).is_some_and(|value| !value.is_null())
     }
 
+    /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The default is nobody's word.
+    ///
+    /// - `yaml`: text of the scene; empty for none.
+    ///
+    /// # Errors
+    /// [`SceneError::NoRadius`] where nobody did.
+    pub fn tell_radius(&mut self, yaml: &str, radius_mm: Option<f64>) -> Result<(), SceneError> {
+        match radius_mm {
+            Some(radius_mm) => self.tip.get_or_insert_default().ball.radius = radius_mm / 1e3,
+            None if Self::names(yaml, "tip", "radius_mm") => {}
+            None => return Err(SceneError::NoRadius),
+        }
+        Ok(())
+    }
+
     /// The scan that the scene names, and the unit of its coordinates.
     ///
     /// - `path`: of the scene.
