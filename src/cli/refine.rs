@@ -24,7 +24,7 @@ use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
-use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
+use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
 
@@ -117,7 +117,7 @@ reported! {
         input: (ToldNumbers, Vec<InputFinding>),
         offsets: (Option<WrenchOffset>, Option<ScanOffset>)
     ) {
-        /// stages built from the scene, those left out, and the memory at start
+        /// stages built from the scene, those left out with the reason of each, and the memory at start
         scene: SceneCost = run.0,
         /// what was told of tip and scan, and by what
         told: ToldNumbers = input.0,
@@ -149,9 +149,9 @@ reported! {
         replay_s: f64 = run.1[1],
         /// of the patch beside the samples, with --live
         live?: LiveSummary = run.2,
-        /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
+        /// the reconstructed faces; `null` where `patch` is off, or nothing was touched
         patch: Option<PatchSummary> = outcome.patch,
-        /// how well that is known; not there when the scene has no `uncertainty`
+        /// how well that is known; not there where `uncertainty` is off
         uncertainty?: UncertaintySummary = outcome.uncertainty,
     }
 }
@@ -200,11 +200,12 @@ pub(super) struct Refined {
     pub losses: Losses,
 }
 
-const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
+const NOTHING_MOVES: &str = "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
 
 const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
 
-const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
+const NO_PATCH: &str =
+    "--live lets the patch follow, and the scene has none: take `patch: off` or `mode: paper` out of it";
 
 /// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
@@ -403,8 +404,11 @@ impl RefineArguments {
 
     /// The stages built from the scene for these samples.
     fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
-        // no arm moves while a recording is replayed
-        let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
+        let unused = [
+            LeftOut { part: "robot", reason: "a replay moves no arm" },
+            LeftOut { part: "markers", reason: "the recording is read for poses" },
+        ];
+        let unused = if self.markers_topic.is_some() { &unused[..1] } else { &unused };
         let memory = Memory::of(rates.engine.refiner().footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }

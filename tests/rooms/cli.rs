@@ -384,7 +384,7 @@ fn a_scene_that_names_no_radius_has_told_none() {
 fn bad_input_is_3_in_one_line_that_names_it() {
     let case = Case::new();
     fs::write(case.path("bad.yaml"), "contact: { on_m: 3 }").unwrap();
-    fs::write(case.path("idle.yaml"), "contact:").unwrap();
+    fs::write(case.path("idle.yaml"), "refine: off").unwrap();
     fs::write(case.path("text.mcap"), "no recording").unwrap();
     let scene = |name: &str| case.path(name).to_str().unwrap().to_owned();
     let (bad, idle) = (scene("bad.yaml"), scene("idle.yaml"));
@@ -395,7 +395,7 @@ fn bad_input_is_3_in_one_line_that_names_it() {
         (case.refine("touch.mcap", "out.ply", &["--scene", &bad]), 3, "did you mean `on_n`"),
         (case.refine("touch.mcap", "out.ply", &["--scene", "no.yaml"]), 3, "no.yaml"),
         (case.refine("touch.mcap", "out.ply", &["--mesh-unit", "m"]), 3, "--mesh-unit mm"),
-        (case.refine("touch.mcap", "out.ply", &["--scene", &idle]), 2, "add `refine:`"),
+        (case.refine("touch.mcap", "out.ply", &["--scene", &idle]), 2, "says `refine: off`"),
         (case.refine("touch.mcap", "no/out.ply", &[]), 1, "out.ply"),
     ];
     for (output, expected, named) in &outputs {

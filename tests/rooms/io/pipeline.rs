@@ -134,8 +134,7 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     assert!(points.len() > 3_000);
     write_mesh(&at("patch.ply"), &patch_under(&points, &forces.iter().sum()), MeshUnit::Millimetre).unwrap();
     // the authors' own threshold of contact; forces here are tenths of a newton
-    fs::write(at("probe.yaml"), "sync:\ncontact: { on_n: 0.1, off_n: 0.06 }\ntip:\nsliding:\ncarve:\nrefine:\n")
-        .unwrap();
+    fs::write(at("probe.yaml"), "contact: { on_n: 0.1, off_n: 0.06 }\nscan: off\nguard: off\npatch: off\n").unwrap();
     let scene = at("probe.yaml");
     let flags = [&PROBE[..], &["--scene", scene.to_str().unwrap()]].concat();
 
@@ -275,10 +274,10 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     assert!((1..4_200_000_000).contains(&number(behind, "max")), "{live}");
     assert!(number(behind, "median") <= number(behind, "max"), "{live}");
     assert!(plate.bytes("beside.ply") == plate.bytes("live.ply"));
-    fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\nrefine:\n").unwrap();
+    fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\npatch: off\n").unwrap();
     let output = plate.refine("none.ply", &["--live", "--scene", plate.at("scene.yaml").to_str().unwrap()]);
     assert_eq!(code(&output), 2);
-    assert!(stderr(&output).contains("add `patch:` to it"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("take `patch: off`"), "{}", stderr(&output));
 }
 
 /// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum shows it.
