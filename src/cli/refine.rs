@@ -357,6 +357,9 @@ impl RefineArguments {
         let counts = refiner.counts();
         let stage = WorkProgress::stage("reconstruct");
         let patcher = patcher.filter(|_| counts.contacts > 0);
+        if let Some(patcher) = patcher.as_ref().filter(|_| !self.force) {
+            patcher.check_extent()?;
+        }
         let places = OutcomePlaces {
             mesh: &self.out,
             unit: self.mesh_unit,

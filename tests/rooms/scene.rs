@@ -568,6 +568,22 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     assert_eq!(paper.built.len() + paper.left_out.len(), 18);
 }
 
+/// What is said to be left out is in no settings: of a part that the scene names and the published rule has not, none are left.
+#[test]
+fn what_is_left_out_is_not_in_the_settings() {
+    let settings = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("refine: {{ mode: paper }}\n{yaml}")).unwrap();
+        (scene.refine_params(WrenchFrame::Sensor), scene.patcher_params())
+    };
+    let parts = ["bias_tracking", "contact", "sliding", "carve", "guard", "patch", "uncertainty"];
+    let [named, off] = ["", "off"].map(|value| parts.map(|part| format!("{part}: {value}\n")).concat());
+    assert_eq!(settings(&named), settings(&off));
+    assert_eq!(settings(&named).1, None);
+    let scene = Scene::from_yaml(&format!("refine: {{ mode: paper }}\n{named}")).unwrap();
+    let left_out: Vec<_> = scene.built(&[], &[]).left_out.iter().map(|left| left.part).collect();
+    assert!(parts.iter().all(|part| left_out.contains(part)), "{left_out:?}");
+}
+
 /// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the next.
 fn urdf_of_seven_joints() -> String {
     let quarter = std::f64::consts::FRAC_PI_2;

@@ -298,6 +298,38 @@ fn the_numbers_add_up_when_a_pose_is_bad() {
     );
 }
 
+/// Each of these once ran for minutes without a word, and took gigabytes.
+#[test]
+fn a_wrong_unit_and_settings_that_cost_too_much_are_refused_with_the_reason() {
+    let plate = Plate::new();
+    let in_mm = plate_touches().into_iter().map(|message| match message {
+        Message::Pose(mut pose) => {
+            pose.pose_ot.translation.vector *= 1e3;
+            Message::Pose(pose)
+        }
+        wrench => wrench,
+    });
+    write_recording(&plate.at("mm.mcap"), &Topics::default(), "object", "stylus", in_mm).unwrap();
+    let tip = ["--tip-radius-mm", "1.5"];
+    let poses = refine(&plate.at("scan.ply"), &plate.at("mm.mcap"), &plate.at("out.ply"), &tip);
+    let with_pitch = |pitch_mm: f64| {
+        let scene = plate.at("fine.yaml");
+        fs::write(&scene, format!("tip: {{ radius_mm: 1.5 }}\npatch: {{ pitch_mm: {pitch_mm} }}\n")).unwrap();
+        plate.refine("out.ply", &["--scene", scene.to_str().unwrap()])
+    };
+    let refused = [
+        (poses, "the poses look like mm"),
+        (plate.refine("out.ply", &["--tip-radius-mm", "0.0015"]), "tip.radius_mm is 0.0015"),
+        (plate.refine("out.ply", &["--tip-radius-mm", "1e-6"]), "tip.radius_mm is 1e-6"),
+        (with_pitch(0.02), "around one contact of a tip of 1.5 mm would have 3.9e7 nodes and take 15.5 GB"),
+        (with_pitch(0.08), "around all that was touched would have"),
+    ];
+    for (output, why) in refused {
+        assert!(code(&output) == 3 && stderr(&output).contains(why), "{why}: {}", stderr(&output));
+        assert!(stderr(&output).lines().count() == 1 && !plate.at("out.ply").exists(), "{}", stderr(&output));
+    }
+}
+
 #[test]
 fn other_parameters_give_another_mesh() {
     let plate = Plate::new();
