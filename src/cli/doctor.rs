@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
-use super::{CliError, Losses, print_report, require};
+use super::{CliError, Losses, print_report};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::io::recording::{StampSource, Topics};
@@ -64,9 +64,6 @@ struct Diagnosis {
 
 /// Kind and exit code of an input that is not to be used.
 pub(super) const UNSOUND: (&str, u8) = ("input", 3);
-
-pub(super) const NO_RADIUS: &str =
-    "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene";
 
 /// The command: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
@@ -130,11 +127,11 @@ pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: 
 impl DoctorArguments {
     /// The scene with the flags over it.
     fn scene(&self) -> Result<Scene, CliError> {
-        let mut scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-        require(self.tip_radius_mm.is_some() || self.scene.is_some() && scene.tip.is_some(), NO_RADIUS)?;
-        if let Some(radius_mm) = self.tip_radius_mm {
-            scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
-        }
+        let (mut scene, yaml) = match &self.scene {
+            Some(path) => Scene::read_with_text(path)?,
+            None => (Scene::default(), String::new()),
+        };
+        scene.tell_radius(&yaml, self.tip_radius_mm)?;
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }

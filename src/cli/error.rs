@@ -19,6 +19,7 @@ use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeError;
+use crate::scene::SceneError;
 use crate::session::OutcomeError;
 use crate::sim::SimError;
 
@@ -178,7 +179,7 @@ macro_rules! errors_of_rooms {
 }
 
 errors_of_rooms! {
-    crate::scene::SceneError => |_| ("scene", 3), "";
+    SceneError => |error| if matches!(error, SceneError::NoRadius) { ("usage", 2) } else { ("scene", 3) }, "";
     // settings come from a scene file: its flags are checked before
     crate::stylus::SettingError => |_| ("scene", 3), "";
     MeshFileError => |_| ("mesh", 3), "";
@@ -213,6 +214,7 @@ errors_of_rooms! {
     crate::ros::RosError => |_| ("ros", 1), "";
     NodeError => |error| match error {
         NodeError::NoScan | NodeError::RegionWithRobot => ("node", 2),
+        NodeError::Scene(error) if matches!(**error, SceneError::NoRadius) => ("usage", 2),
         NodeError::Scene(_) | NodeError::Scan(_) | NodeError::NothingMoves => ("node", 3),
         NodeError::Setting(_) | NodeError::Refine(_) | NodeError::Live(_) => ("node", 3),
         _ => ("node", 1),

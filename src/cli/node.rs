@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
 use super::signals::{SignalKind, on_each_signal};
-use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require};
+use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
 use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
@@ -24,6 +24,9 @@ pub(super) struct NodeArguments {
     /// Names the parts and their parameters, and the scan unless -p scan:=FILE does
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
+    /// Radius of the ball, mm; needed where no scene names it
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    tip_radius_mm: Option<f64>,
     /// Prints the report of the session as one JSON object
     #[arg(long)]
     json: bool,
@@ -33,6 +36,10 @@ pub(super) struct NodeArguments {
 pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::new(ros, |name| std::env::var(name).ok())?;
     arguments.set_scene(&mut config)?;
+    if let Some(radius_mm) = arguments.tip_radius_mm {
+        require_positive("--tip-radius-mm", radius_mm)?;
+        config.parameters.set("tip_radius_mm", &ParameterValue::Double(radius_mm)).map_err(CliError::usage)?;
+    }
     if !config.unused.is_empty() {
         tracing::warn!("the parameter files name what this node does not have: {}", config.unused.join(", "));
     }

@@ -11,7 +11,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::doctor::{NO_RADIUS, UNSOUND, refuse_unsound};
+use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
@@ -24,7 +24,7 @@ use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
-use crate::scene::{CutScan, Memory, Mode, Scene, SceneCost};
+use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
 
@@ -58,7 +58,7 @@ pub(super) struct RefineArguments {
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
-    /// Radius of the ball, mm; needed where no scene names the tip
+    /// Radius of the ball, mm; needed where no scene names it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub tip_radius_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm
@@ -90,9 +90,6 @@ pub(super) struct RefineArguments {
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
-    /// Whether it is a session of the node, which had its scene
-    #[arg(skip)]
-    is_session: bool,
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
@@ -120,7 +117,7 @@ reported! {
         input: (ToldNumbers, Vec<InputFinding>),
         offsets: (Option<WrenchOffset>, Option<ScanOffset>)
     ) {
-        /// stages built from the scene, those left out, and the memory at start
+        /// stages built from the scene, those left out with the reason of each, and the memory at start
         scene: SceneCost = run.0,
         /// what was told of tip and scan, and by what
         told: ToldNumbers = input.0,
@@ -152,9 +149,9 @@ reported! {
         replay_s: f64 = run.1[1],
         /// of the patch beside the samples, with --live
         live?: LiveSummary = run.2,
-        /// the reconstructed faces; `null` when the scene has no `patch`, or nothing was touched
+        /// the reconstructed faces; `null` where `patch` is off, or nothing was touched
         patch: Option<PatchSummary> = outcome.patch,
-        /// how well that is known; not there when the scene has no `uncertainty`
+        /// how well that is known; not there where `uncertainty` is off
         uncertainty?: UncertaintySummary = outcome.uncertainty,
     }
 }
@@ -203,11 +200,12 @@ pub(super) struct Refined {
     pub losses: Losses,
 }
 
-const NOTHING_MOVES: &str = "the scene names no `refine`, so nothing would move the mesh: add `refine:` to it";
+const NOTHING_MOVES: &str = "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
 
 const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
 
-const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: add `patch:` to it";
+const NO_PATCH: &str =
+    "--live lets the patch follow, and the scene has none: take `patch: off` or `mode: paper` out of it";
 
 /// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
@@ -273,7 +271,7 @@ impl RefineArguments {
             let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
             (self.bag, self.wrench_topic, self.pose_topic) = (recording, topics.wrench, topics.pose);
-            (self.strokes, self.is_session) = (strokes, true);
+            self.strokes = strokes;
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
             }
@@ -359,6 +357,9 @@ impl RefineArguments {
         let counts = refiner.counts();
         let stage = WorkProgress::stage("reconstruct");
         let patcher = patcher.filter(|_| counts.contacts > 0);
+        if let Some(patcher) = patcher.as_ref().filter(|_| !self.force) {
+            patcher.check_extent()?;
+        }
         let places = OutcomePlaces {
             mesh: &self.out,
             unit: self.mesh_unit,
@@ -406,8 +407,11 @@ impl RefineArguments {
 
     /// The stages built from the scene for these samples.
     fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
-        // no arm moves while a recording is replayed
-        let unused = if self.markers_topic.is_some() { &["robot"][..] } else { &["robot", "markers"] };
+        let unused = [
+            LeftOut { part: "robot", reason: "a replay moves no arm" },
+            LeftOut { part: "markers", reason: "the recording is read for poses" },
+        ];
+        let unused = if self.markers_topic.is_some() { &unused[..1] } else { &unused };
         let memory = Memory::of(rates.engine.refiner().footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }
@@ -455,11 +459,8 @@ impl RefineArguments {
             None if Scene::names(&yaml, section, key) => ToldBy::Scene,
             None => ToldBy::Default,
         };
+        scene.tell_radius(&yaml, self.tip_radius_mm)?;
         let radius_by = told_by(self.tip_radius_mm, "tip", "radius_mm");
-        require(radius_by != ToldBy::Default || self.is_session, NO_RADIUS)?;
-        if let Some(radius_mm) = self.tip_radius_mm {
-            scene.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
-        }
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }

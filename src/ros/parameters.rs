@@ -122,6 +122,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
     &[
         fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
         fixed("scan", String(""), "the mesh to be refined; empty: the one that the scene names"),
+        fixed("tip_radius_mm", Double(0.0, 0.0, 1_000.0), "radius of the ball; 0: the one that the scene names"),
         fixed("mesh_unit", OneOf("mm", MeshUnit::WORDS), "unit of its coordinates"),
         fixed("source", OneOf("stylus", &["stylus", "probe"]), "who touches"),
         fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),

@@ -46,7 +46,7 @@ def labels(array):
 
 def show(touchup_bin, demo, out, domain, label_count):
     """Plays demo/touch.mcap to a node with demo/scan.ply and sessions in out, and waits until so many features have labels."""
-    ros = ["-p", f"scan:={demo / 'scan.ply'}", "-p", f"view_rate_hz:={VIEW_RATE_HZ}"]
+    ros = ["-p", f"scan:={demo / 'scan.ply'}", "-p", "tip_radius_mm:=1.5", "-p", f"view_rate_hz:={VIEW_RATE_HZ}"]
     with Node(touchup_bin, out, domain=domain, ros=ros) as node:
         peer = Peer(domain)
         mesh = peer.reader("/mesh", Marker, LATCHED)

@@ -137,7 +137,7 @@ def moved(run, tmp_path_factory):
     sections = (ROOT / "config" / "default.yaml").read_text().split("\n\n")
     kept = [section for section in sections if "\npatch:" not in section]
     assert len(kept) == len(sections) - 1
-    scene.write_text("\n\n".join(kept))
+    scene.write_text("\n\n".join([*kept, "patch: off\n"]))
     return {case: run(case, scene) for case in CASES}
 
 

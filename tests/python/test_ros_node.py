@@ -278,9 +278,10 @@ def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(de
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["node"], 2, ["no scan", "-p scan:=FILE"]),
+        (["node"], 2, ["the radius of the ball is not known"]),
+        (["node", "--tip-radius-mm", "1.5"], 2, ["no scan", "-p scan:=FILE"]),
         (["node", "--scene", "nowhere.yaml"], 3, ["nowhere.yaml"]),
-        (["node", "--ros-args", "-p", "scan:=nowhere.ply"], 3, ["nowhere.ply"]),
+        (["node", "--ros-args", "-p", "scan:=nowhere.ply", "-p", "tip_radius_mm:=1.5"], 3, ["nowhere.ply"]),
         (["node", "--ros-args", "-p", "view_rate_hz:=1000"], 2, ["view_rate_hz", "0.1 to 100"]),
         (["node", "--ros-args", "--remap", "x"], 2, ["FROM:=TO"]),
         (["replay", "nowhere.mcap"], 3, ["nowhere.mcap"]),

@@ -352,11 +352,39 @@ fn wrong_flags_are_2_before_anything_is_read() {
     assert!(!case.path("out.ply").exists());
 }
 
+/// Nobody has told the radius of a scene that does not name it, whoever asks; refined by a ball of 1.5 mm, a hole is found too small.
+#[test]
+fn a_scene_that_names_no_radius_has_told_none() {
+    let case = Case::new();
+    let path = |name: &str| case.path(name).to_str().unwrap().to_owned();
+    fs::write(path("untold.yaml"), "tip: { stiffness_n_per_mm: 20 }\nscan: { file: scan.ply }\nrobot:\n").unwrap();
+    let (scene, out) = (path("untold.yaml"), path("out"));
+    let probe = ["probe", "--robot", "sim", "--scene", &scene, "--feature", "hole@0,0,0", "--out", &out, "--dry-run"];
+    let sessions = format!("session_folder:={out}");
+    let node = ["node", "--scene", &scene, "--ros-args", "-p", &sessions];
+    let asked = [
+        case.refine_untold("touch.mcap", "out.ply", &["--scene", &scene]),
+        touchup(&["doctor", &path("scan.ply"), &path("touch.mcap"), "--scene", &scene], ""),
+        touchup(&["doctor", &path("scan.ply"), &path("touch.mcap")], ""),
+        touchup(&probe, ""),
+        touchup(&node, ""),
+        touchup(&["node", "--ros-args", "-p", &format!("scan:={}", path("scan.ply"))], ""),
+    ];
+    for output in asked {
+        let message = text(&output.stderr);
+        assert_eq!((code(&output), text(&output.stdout)), (2, ""), "{message}");
+        assert!(message.contains("the radius of the ball is not known") && message.lines().count() == 1, "{message}");
+    }
+    assert!(!case.path("out").exists() && !case.path("out.ply").exists());
+    let told = ["doctor", &path("scan.ply"), &path("touch.mcap"), "--scene", &scene, "--tip-radius-mm", "1.5"];
+    assert_eq!(code(&touchup(&told, "")), 0);
+}
+
 #[test]
 fn bad_input_is_3_in_one_line_that_names_it() {
     let case = Case::new();
     fs::write(case.path("bad.yaml"), "contact: { on_m: 3 }").unwrap();
-    fs::write(case.path("idle.yaml"), "contact:").unwrap();
+    fs::write(case.path("idle.yaml"), "refine: off").unwrap();
     fs::write(case.path("text.mcap"), "no recording").unwrap();
     let scene = |name: &str| case.path(name).to_str().unwrap().to_owned();
     let (bad, idle) = (scene("bad.yaml"), scene("idle.yaml"));
@@ -367,7 +395,7 @@ fn bad_input_is_3_in_one_line_that_names_it() {
         (case.refine("touch.mcap", "out.ply", &["--scene", &bad]), 3, "did you mean `on_n`"),
         (case.refine("touch.mcap", "out.ply", &["--scene", "no.yaml"]), 3, "no.yaml"),
         (case.refine("touch.mcap", "out.ply", &["--mesh-unit", "m"]), 3, "--mesh-unit mm"),
-        (case.refine("touch.mcap", "out.ply", &["--scene", &idle]), 2, "add `refine:`"),
+        (case.refine("touch.mcap", "out.ply", &["--scene", &idle]), 2, "says `refine: off`"),
         (case.refine("touch.mcap", "no/out.ply", &[]), 1, "out.ply"),
     ];
     for (output, expected, named) in &outputs {

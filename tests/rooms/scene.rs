@@ -10,8 +10,8 @@ use touchup::haptic::{Along, ContactModel, DynamicsParams, RefineParams, RoiSize
 use touchup::io::mesh_file::MeshUnit;
 use touchup::reconstruct::PatcherParams;
 use touchup::scene::{
-    CompensationSection, GravityAxes, MarkersSection, Mode, PayloadSection, RobotSection, ScanToSpaceSection, Scene,
-    SceneError, Setting,
+    CompensationSection, GravityAxes, LeftOut, MarkersSection, Mode, PayloadSection, RobotSection, ScanToSpaceSection,
+    Scene, SceneError, Setting,
 };
 use touchup::stylus::{BiasParams, SensorBias, SensorMount, SyncParams, TipShape, WrenchFrame};
 
@@ -112,28 +112,57 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
 }
 
+/// What a right result needs is there unless the scene says `off`; what only some sensors need is there where it is named.
 #[test]
-fn a_part_is_built_only_when_named() {
-    let none = Scene::from_yaml("{}").unwrap();
-    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact.is_none());
+fn a_scene_says_what_differs() {
+    assert_eq!(Scene::from_yaml("{}").unwrap(), Scene::default());
+    // a scene that once had neither gate nor patch, and repaired nothing
+    let little = Scene::from_yaml("sync:\ntip: { radius_mm: 1.5 }\nscan:\nrefine:\n").unwrap();
+    assert_eq!(little, Scene::default());
+    assert!(little.refine_params(WrenchFrame::Sensor).unwrap().gate.is_some() && little.patcher_params().is_some());
+    let more = Scene::from_yaml("{ tip: , contact: { on_n: 1 }, bias_tracking: }").unwrap();
+    assert_eq!((more.contact.unwrap().on, more.bias_tracking), (1.0, Some(BiasParams::default())));
+
+    let all_off = Scene::from_yaml(
+        "sync: off\nclock: off\nmarkers: off\nscan_to_space: off\ncompensation: off\nbias_tracking: off\ncontact: off\n\
+         tip: off\nscan: off\nsliding: off\ncarve: off\nguard: off\npatch: off\nuncertainty: off\nrobot: off\nrefine: off\n",
+    );
+    let none = all_off.unwrap();
+    assert!(none.refine_params(WrenchFrame::Sensor).is_none() && none.contact.is_none() && none.clock.is_none());
     assert!(none.patcher_params().is_none());
     let SyncParams { reorder_ns, largest_gap_ns, .. } = none.sync_params();
     assert_eq!((reorder_ns, largest_gap_ns), (0, 0));
     assert_eq!(none.compensator_params(WrenchFrame::Object).payload, None);
-    assert!(none.clock.is_none());
-    let clock = Scene::from_yaml("{ clock: , tip: , contact: { on_n: 1 } }").unwrap();
-    assert_eq!((clock.clock.is_some(), clock.tip_params().stiffness), (true, Some(2e4)));
+    assert_eq!(none.built(&[], &[]).built, Vec::<&str>::new());
+    assert_eq!(none.tip_params(), TipParams { radius: 0.0, stiffness: None });
 
-    let loop_alone = Scene::from_yaml("refine:").unwrap().refine_params(WrenchFrame::Object).unwrap();
+    let loop_alone = "{ contact: off, tip: off, scan: off, sliding: off, carve: off, guard: off, patch: off }";
+    let loop_alone = Scene::from_yaml(loop_alone).unwrap().refine_params(WrenchFrame::Object).unwrap();
     assert_eq!((loop_alone.gate, loop_alone.sliding, loop_alone.carve, loop_alone.guard), (None, None, None, None));
     assert_eq!((loop_alone.tip, loop_alone.scan_noise), (TipParams { radius: 0.0, stiffness: None }, 0.0));
     assert_eq!(loop_alone.compensator.wrench_frame, WrenchFrame::Object);
 
-    let bare = Scene::from_yaml(
-        "sync:\nclock:\ncontact: {}\ntip:\nscan:\nsliding:\ncarve:\nguard:\npatch:\nuncertainty:\nrefine:\n",
-    )
-    .unwrap();
-    assert_eq!(bare, Scene::default(), "a part named without keys takes its defaults");
+    // YAML 1.1 reads off as false
+    assert_eq!(Scene::from_yaml("patch: false").unwrap(), Scene::from_yaml("{ patch: off }").unwrap());
+    let inner = Scene::from_yaml("compensation: { payload: off, bias: }").unwrap().compensation.unwrap();
+    assert_eq!((inner.payload, inner.bias), (None, Some(SensorBias::default())));
+}
+
+/// The radius is told by the text or by a flag; the default is nobody's word, and a point has none.
+#[test]
+fn a_radius_is_told_by_somebody() {
+    let told = |yaml: &str, flag: Option<f64>| {
+        let mut scene = Scene::from_yaml(yaml).unwrap();
+        scene.tell_radius(yaml, flag).map(|()| scene.tip_params().radius)
+    };
+    assert_eq!(told("tip: { radius_mm: 2 }", None).unwrap(), 2e-3);
+    assert_eq!(told("tip: { radius_mm: 2 }", Some(3.0)).unwrap(), 3e-3);
+    assert_eq!(told("{ tip: off, patch: off }", None).unwrap(), 0.0);
+    for untold in ["{}", "tip:", "tip: { stiffness_n_per_mm: 20 }", "tip: { radius_mm: ~ }"] {
+        if Scene::from_yaml(untold).is_ok() {
+            assert!(matches!(told(untold, None), Err(SceneError::NoRadius)), "{untold}");
+        }
+    }
 }
 
 /// Each section of the shipped file by its header alone: the keys below it are off.
@@ -182,17 +211,21 @@ fn friction_and_free_space_are_parts_of_the_update_and_of_the_patch_or_of_neithe
         assert_eq!(refiner.carve.is_some(), patcher.free_space);
         (patcher.touches.cone_cosine, patcher.free_space)
     };
-    assert_eq!(parts(""), (None, false));
-    assert_eq!(parts("sliding: "), (Some(0.9135), false));
-    assert_eq!(parts("sliding: { cone_cosine: 0.8 }, carve: "), (Some(0.8), true));
-    assert_eq!(parts("carve: "), (None, true));
+    assert_eq!(parts("sliding: off, carve: off"), (None, false));
+    assert_eq!(parts("carve: off"), (Some(0.9135), false));
+    assert_eq!(parts("sliding: { cone_cosine: 0.8 }"), (Some(0.8), true));
+    assert_eq!(parts("sliding: off"), (None, true));
 }
 
 #[test]
 fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
-    for yaml in ["contact:\npatch:\nrefine:\n", "tip: { radius_mm: 0 }\ncontact:\npatch:\n", "tip:\npatch:\n"] {
-        let error = Scene::from_yaml(yaml).unwrap_err().to_string();
-        assert!(error.starts_with("patch needs "), "{yaml}: {error}");
+    let radius = "patch needs tip.radius_mm above 0: name it, or say `patch: off`";
+    let contact = "patch needs contact: name it, or say `patch: off`";
+    for (yaml, expected) in [("tip: off", radius), ("tip: { radius_mm: 0 }", radius), ("contact: off", contact)] {
+        assert_eq!(Scene::from_yaml(yaml).unwrap_err().to_string(), expected, "{yaml}");
+        for without in ["patch: off", "refine: { mode: paper }"] {
+            assert!(Scene::from_yaml(&format!("{yaml}\n{without}")).is_ok(), "{yaml}, {without}");
+        }
     }
     let yaml = "tip: { radius_mm: 2 }\ncontact: { on_n: 1, off_n: 0.5 }\nscan: { noise_mm: 2 }\n\
                 patch: { pitch_mm: 0.4, most_faces: 3 }";
@@ -284,6 +317,8 @@ fn each_mistake_is_refused_in_one_line_with_place_and_cause() {
         ("compensation: { payload: { mass_kg: -2 } }", &["compensation.payload.mass_kg is -2"]),
         ("compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }", &["sensor_orientation_xyzw is 0", "length"]),
         ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),
+        ("patch: on", &["expected keys with values, or off", "line 1"]),
+        ("patch: 3", &["expected keys with values, or off", "line 1"]),
         ("[", &["line"]),
     ];
     for (yaml, parts) in bad {
@@ -333,7 +368,7 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
 
 /// A scene as a user wrote it, with what each calibration sets.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {
-    let mut expected = if yaml.trim().is_empty() { Scene::from_yaml("{}") } else { Scene::from_yaml(yaml) }.unwrap();
+    let mut expected = if yaml.trim().is_empty() { Scene::default() } else { Scene::from_yaml(yaml).unwrap() };
     let section =
         ScanToSpaceSection { position: vector![1.5, -2.0, 3.25] / 1e3, orientation_xyzw: [0.0, 0.6, 0.0, 0.8] };
     expected.scan_to_space = Some(section);
@@ -420,6 +455,8 @@ fn every_form_of_writing_is_edited_or_refused() {
         "compensation:\n  bias:\n  payload: {mass_kg: 3}\n  # last\n\n\n\ntip: {offset_mm: [1,\n 2, 3]}",
         "compensation:\n  bias: {}\n  payload: ~\n",
         "scan_to_space: {}\ntip:\n  # nothing\n#tail\n",
+        "scan_to_space: off\ncompensation: off # none\n",
+        "{ compensation: off, scan_to_space: off }",
     ];
     for form in forms {
         let after = calibrated(form).unwrap_or_else(|error| panic!("{form:?}: {error}"));
@@ -495,29 +532,56 @@ fn gravity_in_the_axes_of_space_turns_with_the_scan() {
     assert_eq!(Scene::default().placement(), None);
 }
 
-/// Names as in the YAML, in its order, listed here by hand.
+/// Names as in the YAML, in its order, listed here by hand; each that is left out with its reason.
 #[test]
 fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
-    let built = |yaml: &str| {
-        let mut built = Scene::from_yaml(yaml).unwrap().built(&["robot"], &touchup::FEATURES);
-        // compiled features differ from one to the other
-        for names in [&mut built.built, &mut built.left_out] {
-            names.retain(|name| !name.starts_with("feature "));
-        }
-        built.to_string()
-    };
-    let all_but_refine = "sync, clock, markers, scan_to_space, compensation, bias_tracking, contact, tip, scan, \
-                          scan.region, sliding, carve, guard, patch, uncertainty, robot";
-    assert_eq!(built("refine:"), format!("built: refine; left out: {all_but_refine}"));
-    assert_eq!(built("sync:\nrefine:\ncontact:"), {
-        let left_out = "clock, markers, scan_to_space, compensation, bias_tracking, tip, scan, scan.region, sliding, carve, guard, \
-                        patch, uncertainty, robot";
-        format!("built: sync, contact, refine; left out: {left_out}")
-    });
+    let unused = [LeftOut { part: "robot", reason: "no arm here" }, LeftOut { part: "clock", reason: "no clock here" }];
+    let built = |yaml: &str| Scene::from_yaml(yaml).unwrap().built(&unused, &[("feature x", false)]);
+    let text = built("{}").to_string();
+    let unnamed = "markers, scan_to_space, compensation, bias_tracking, scan.region, robot (not named in the scene)";
+    assert_eq!(
+        text,
+        format!(
+            "built: sync, contact, tip, scan, sliding, carve, guard, patch, uncertainty, refine; left out: clock (no clock \
+             here); {unnamed}; feature x (not in this build of touchup)"
+        )
+    );
+    let off = built("{ guard: off, patch: off, robot: , clock: off }").to_string();
+    let left_out = "clock, guard, patch (off in the scene); markers, scan_to_space, compensation, bias_tracking, scan.region (not named \
+                    in the scene); uncertainty (of the patch, which is left out); robot (no arm here)";
+    assert!(
+        off.starts_with(&format!("built: sync, contact, tip, scan, sliding, carve, refine; left out: {left_out}")),
+        "{off}"
+    );
     // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever is named
     let paper = built("contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }");
-    assert!(paper.starts_with("built: tip, refine; left out: sync"), "{paper}");
-    assert!(paper.ends_with("sliding, carve, guard, patch, uncertainty, robot"), "{paper}");
+    assert_eq!(paper.built, ["sync", "tip", "scan", "refine"]);
+    let published = paper.left_out.iter().filter(|left| left.reason == "the published rule has none");
+    assert_eq!(
+        published.map(|left| left.part).collect::<Vec<_>>(),
+        ["contact", "sliding", "carve", "guard", "patch"],
+        "{paper}"
+    );
+    let json = serde_json::to_value(&paper).unwrap();
+    assert_eq!(json["left_out"][0], serde_json::json!({ "part": "clock", "reason": "no clock here" }));
+    // all parts are either built or left out, once
+    assert_eq!(paper.built.len() + paper.left_out.len(), 18);
+}
+
+/// What is said to be left out is in no settings: of a part that the scene names and the published rule has not, none are left.
+#[test]
+fn what_is_left_out_is_not_in_the_settings() {
+    let settings = |yaml: &str| {
+        let scene = Scene::from_yaml(&format!("refine: {{ mode: paper }}\n{yaml}")).unwrap();
+        (scene.refine_params(WrenchFrame::Sensor), scene.patcher_params())
+    };
+    let parts = ["bias_tracking", "contact", "sliding", "carve", "guard", "patch", "uncertainty"];
+    let [named, off] = ["", "off"].map(|value| parts.map(|part| format!("{part}: {value}\n")).concat());
+    assert_eq!(settings(&named), settings(&off));
+    assert_eq!(settings(&named).1, None);
+    let scene = Scene::from_yaml(&format!("refine: {{ mode: paper }}\n{named}")).unwrap();
+    let left_out: Vec<_> = scene.built(&[], &[]).left_out.iter().map(|left| left.part).collect();
+    assert!(parts.iter().all(|part| left_out.contains(part)), "{left_out:?}");
 }
 
 /// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the next.

@@ -32,7 +32,8 @@ use std::marker::PhantomData;
 use std::path::PathBuf;
 
 use nalgebra::{Point3, Vector3};
-use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Unexpected, Visitor};
 
 /// A parameter outside the range in which it has a meaning.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -195,7 +196,7 @@ pub trait Value: Sized {
     /// As YAML on one line; `None`: it is left out.
     fn yaml(&self, unit: Unit) -> Option<String>;
 
-    /// The value of a key that is there, also without a value: that names a section with its defaults.
+    /// The value of a key that is there, also without a value: that names a section with its defaults; `off` is no section.
     fn given(written: Self::Written, unit: Unit) -> Self {
         Self::of(written, unit)
     }
@@ -205,8 +206,10 @@ pub trait Value: Sized {
         None
     }
 
-    /// Makes it what it is when its key is not there: no section is built that is not named.
-    fn leave_out(&mut self) {}
+    /// Whether it is a section that is written as `off`.
+    fn is_off(_: &Self::Written) -> bool {
+        false
+    }
 
     /// Its numbers in SI, all within the range.
     fn numbers(&self) -> Vec<f64> {
@@ -352,12 +355,10 @@ impl<T: Value> Value for Option<T> {
     }
 
     fn given(written: Self::Written, unit: Unit) -> Self {
-        Self::of(written, unit).or_else(T::named)
-    }
-
-    fn leave_out(&mut self) {
-        if T::IS_SECTION {
-            *self = None;
+        match written {
+            None => T::named(),
+            Some(written) if T::is_off(&written) => None,
+            Some(written) => Some(T::of(written, unit)),
         }
     }
 
@@ -388,9 +389,6 @@ pub trait Section: Default {
 
     /// What is declared of each key.
     fn parameters() -> Vec<Parameter>;
-
-    /// What it is when no key is named: its defaults, without the sections in it.
-    fn bare() -> Self;
 
     /// Reads the value of a key; `false` for one that is not of this section.
     ///
@@ -435,11 +433,55 @@ impl<'de, S: Section> Visitor<'de> for SectionVisitor<S> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<S, A::Error> {
-        let mut section = S::bare();
+        let mut section = S::default();
         while let Some(key) = map.next_key_seed(KnownKey(S::keys()))? {
             section.read_key(key, &mut map)?;
         }
         Ok(section)
+    }
+}
+
+/// A section as it is written under its key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WrittenSection<S> {
+    /// its keys
+    Keys(S),
+    /// the word `off`: it is not built
+    Off,
+}
+
+impl<S: Default> Default for WrittenSection<S> {
+    fn default() -> Self {
+        Self::Keys(S::default())
+    }
+}
+
+impl<'de, S: Section> Deserialize<'de> for WrittenSection<S> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WrittenSectionVisitor(PhantomData))
+    }
+}
+
+struct WrittenSectionVisitor<S>(PhantomData<S>);
+
+impl<'de, S: Section> Visitor<'de> for WrittenSectionVisitor<S> {
+    type Value = WrittenSection<S>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("keys with values, or off")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+        SectionVisitor(PhantomData).visit_map(map).map(WrittenSection::Keys)
+    }
+
+    fn visit_str<E: Error>(self, word: &str) -> Result<Self::Value, E> {
+        if word == "off" { Ok(WrittenSection::Off) } else { Err(E::invalid_value(Unexpected::Str(word), &self)) }
+    }
+
+    // off is a boolean of YAML 1.1
+    fn visit_bool<E: Error>(self, is_on: bool) -> Result<Self::Value, E> {
+        if is_on { Err(E::invalid_value(Unexpected::Bool(is_on), &self)) } else { Ok(WrittenSection::Off) }
     }
 }
 
@@ -473,7 +515,6 @@ macro_rules! parameters {
     (@unit $unit:ident) => { $crate::parameters::Unit::$unit };
     (@range) => { None };
     (@range $low:literal $high:literal) => { Some([$low as f64, $high as f64]) };
-    (@leave_out $key:literal $field:expr) => { $crate::parameters::Value::leave_out(&mut $field) };
     (@or) => { "" };
     (@or $text:literal) => { $text };
     (@default ($default:expr) ($type:ty)) => { $default };
@@ -559,13 +600,6 @@ macro_rules! parameters {
                 all
             }
 
-            #[allow(unused_mut)]
-            fn bare() -> Self {
-                let mut this = Self::default();
-                $($($crate::parameters!(@leave_out $key this.$field);)?)*
-                this
-            }
-
             #[allow(unused_variables)]
             fn read_key<'de, A: ::serde::de::MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
                 match key {
@@ -589,11 +623,18 @@ macro_rules! parameters {
         }
 
         impl $crate::parameters::Value for $Name {
-            type Written = Self;
+            type Written = $crate::parameters::WrittenSection<Self>;
             const IS_SECTION: bool = true;
 
-            fn of(written: Self, _: $crate::parameters::Unit) -> Self {
-                written
+            fn of(written: Self::Written, _: $crate::parameters::Unit) -> Self {
+                match written {
+                    $crate::parameters::WrittenSection::Keys(section) => section,
+                    $crate::parameters::WrittenSection::Off => Self::default(),
+                }
+            }
+
+            fn is_off(written: &Self::Written) -> bool {
+                matches!(written, $crate::parameters::WrittenSection::Off)
             }
 
             fn yaml(&self, _: $crate::parameters::Unit) -> Option<String> {

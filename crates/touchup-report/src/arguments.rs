@@ -237,7 +237,7 @@ impl ReportArguments {
         let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
         let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
         let recording = Recording::open(bag, &Topics::default(), StampSource::Header).map_err(ReplayError::from)?;
-        let no_refine = || CommandError::Usage("the scene names no `refine`: add `refine:` to it".to_owned());
+        let no_refine = || CommandError::Usage("the scene says `refine: off`: take that out of it".to_owned());
         let params = scene.refine_params(recording.wrench_frame).ok_or_else(no_refine)?;
         let mut samples = Vec::new();
         each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, &mut |_| (), |sample| {

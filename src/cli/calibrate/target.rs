@@ -7,14 +7,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::{CliError, check_kept, not_written, print_report, require};
+use crate::cli::{CliError, check_kept, not_written, print_report};
 use crate::io::atomic::write_atomically;
 use crate::scene::{Scene, Setting};
 
 /// Error of a calibration with an arm but without a scene.
 const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
-
-const NO_RADIUS: &str = "the radius of the ball is not known: give a scene with tip.radius_mm (touchup init)";
 
 /// Where the result goes, and how it is printed.
 #[derive(Debug, Args)]
@@ -41,7 +39,7 @@ pub(super) struct DraftScene {
 impl DraftScene {
     /// Refuses a scene that does not tell the radius of the ball.
     pub fn require_radius(&self) -> Result<(), CliError> {
-        require(Scene::names(&self.text, "tip", "radius_mm"), NO_RADIUS)
+        Ok(self.scene.clone().tell_radius(&self.text, None)?)
     }
 }
 

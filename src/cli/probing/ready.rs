@@ -45,9 +45,10 @@ const NO_MOTION: &str =
     "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
 
 impl Ready {
-    /// Reads scene and scan.
+    /// Reads scene and scan; the scene tells the radius of the ball.
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
-        let scene = Scene::read(scene)?;
+        let (mut scene, yaml) = Scene::read_with_text(scene)?;
+        scene.tell_radius(&yaml, None)?;
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
         let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
         info!(%repair, "scan");

@@ -37,7 +37,7 @@ struct FollowingMesh {
 
 impl FollowingMesh {
     fn new(ready: &Ready, is_simulated: bool) -> Result<Self, CliError> {
-        let nothing = || CliError::usage("the scene names no `refine`, so nothing would move the mesh");
+        let nothing = || CliError::usage("the scene says `refine: off`, so nothing would move the mesh");
         let params = ready.scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
         // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
         let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };

@@ -24,8 +24,8 @@ pub enum NodeError {
     /// The scene cannot be used.
     #[error(transparent)]
     Scene(#[from] Box<SceneError>),
-    /// The scene has no `refine`.
-    #[error("the scene names no `refine`, so nothing would move the mesh: add `refine:` to it")]
+    /// The scene says `refine: off`.
+    #[error("the scene says `refine: off`, so nothing would move the mesh: take that out of it")]
     NothingMoves,
     /// The scene has no `robot`.
     #[error(

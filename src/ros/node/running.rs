@@ -19,7 +19,7 @@ use crate::ros::inbox::Arrivals;
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
-use crate::scene::{Memory, Scene, SceneCost};
+use crate::scene::{LeftOut, Memory, Scene, SceneCost};
 
 /// Inputs that wait for the view at most: frames of it are dropped first.
 const VIEW_QUEUE: usize = 256;
@@ -85,8 +85,12 @@ impl Prepared {
     /// - `has_arm`: whether an arm probes.
     pub fn cost(&self, has_arm: bool) -> SceneCost {
         let Self { setup, session } = self;
-        // the node looks for no clock, and poses come as such
-        let unused = if has_arm { &["clock", "markers"][..] } else { &["clock", "markers", "robot"] };
+        let unused = [
+            LeftOut { part: "clock", reason: "the node estimates none" },
+            LeftOut { part: "markers", reason: "poses come as such" },
+            LeftOut { part: "robot", reason: "no arm was asked for" },
+        ];
+        let unused = if has_arm { &unused[..2] } else { &unused };
         let (scan, tree) = &*setup.scan;
         let memory = Memory::of(session.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
         SceneCost { parts: setup.scene.built(unused, &crate::FEATURES), memory }

@@ -11,10 +11,7 @@ use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::io::recording::Topics;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::parameters::Parameters;
-use crate::scene::{CutScan, RegionCut, Scene};
-
-/// The scene of who names none.
-const DEFAULT_SCENE: &str = include_str!("../../../config/default.yaml");
+use crate::scene::{CutScan, RegionCut, Scene, SceneError, Setting};
 
 /// The scan as it came, and the tree over its faces.
 pub type Scan = Arc<(TriMesh, FaceTree)>;
@@ -37,10 +34,7 @@ pub(crate) struct Setup {
 impl Setup {
     pub fn new(parameters: Parameters, clock: Clock) -> Result<Self, NodeError> {
         let scene_path = Path::new(parameters.string("scene"));
-        let (scene, scene_yaml) = match scene_path.as_os_str().is_empty() {
-            true => (Scene::from_yaml(DEFAULT_SCENE).map_err(Box::new)?, DEFAULT_SCENE.to_owned()),
-            false => Scene::read_with_text(scene_path).map_err(Box::new)?,
-        };
+        let (scene, scene_yaml) = scene_of(scene_path, parameters.double("tip_radius_mm")).map_err(Box::new)?;
         let (scan_path, mesh_unit) = match parameters.string("scan") {
             "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
             path => (PathBuf::from(path), mesh_unit(&parameters)),
@@ -73,6 +67,27 @@ impl Setup {
             tool,
         })
     }
+}
+
+/// The scene and its text, which the session keeps: both with the radius of the ball that was told.
+///
+/// - `path`: empty for the default scene.
+/// - `radius_mm`: the parameter; 0: as the scene says.
+fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> {
+    let (mut scene, yaml) = match path.as_os_str().is_empty() {
+        true => (Scene::default(), Scene::template_without_radius()),
+        false => Scene::read_with_text(path)?,
+    };
+    let radius_mm = Some(radius_mm).filter(|mm| *mm > 0.0);
+    scene.tell_radius(&yaml, radius_mm)?;
+    scene.validate()?;
+    let Some(mm) = radius_mm else { return Ok((scene, yaml)) };
+    // what the text says, without the files that it names
+    let mut expected = Scene::from_yaml(&yaml)?;
+    expected.tell_radius(&yaml, radius_mm)?;
+    let set = [Setting::scalar("tip.radius_mm", mm)];
+    let yaml = Scene::edited(&yaml, &set, "parameter tip_radius_mm", &expected)?;
+    Ok((scene, yaml))
 }
 
 /// The unit of the files, of the parameter `mesh_unit`.

@@ -134,8 +134,7 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     assert!(points.len() > 3_000);
     write_mesh(&at("patch.ply"), &patch_under(&points, &forces.iter().sum()), MeshUnit::Millimetre).unwrap();
     // the authors' own threshold of contact; forces here are tenths of a newton
-    fs::write(at("probe.yaml"), "sync:\ncontact: { on_n: 0.1, off_n: 0.06 }\ntip:\nsliding:\ncarve:\nrefine:\n")
-        .unwrap();
+    fs::write(at("probe.yaml"), "contact: { on_n: 0.1, off_n: 0.06 }\nscan: off\nguard: off\npatch: off\n").unwrap();
     let scene = at("probe.yaml");
     let flags = [&PROBE[..], &["--scene", scene.to_str().unwrap()]].concat();
 
@@ -275,10 +274,10 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     assert!((1..4_200_000_000).contains(&number(behind, "max")), "{live}");
     assert!(number(behind, "median") <= number(behind, "max"), "{live}");
     assert!(plate.bytes("beside.ply") == plate.bytes("live.ply"));
-    fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\nrefine:\n").unwrap();
+    fs::write(plate.at("scene.yaml"), "tip:\n  radius_mm: 1.5\npatch: off\n").unwrap();
     let output = plate.refine("none.ply", &["--live", "--scene", plate.at("scene.yaml").to_str().unwrap()]);
     assert_eq!(code(&output), 2);
-    assert!(stderr(&output).contains("add `patch:` to it"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("take `patch: off`"), "{}", stderr(&output));
 }
 
 /// A pose that is no rotation is a lost pose: no sample is lost for it, and the sum shows it.
@@ -297,6 +296,38 @@ fn the_numbers_add_up_when_a_pose_is_bad() {
         (4_200, 4_199),
         "the last wrench has no pose after it"
     );
+}
+
+/// Each of these once ran for minutes without a word, and took gigabytes.
+#[test]
+fn a_wrong_unit_and_settings_that_cost_too_much_are_refused_with_the_reason() {
+    let plate = Plate::new();
+    let in_mm = plate_touches().into_iter().map(|message| match message {
+        Message::Pose(mut pose) => {
+            pose.pose_ot.translation.vector *= 1e3;
+            Message::Pose(pose)
+        }
+        wrench => wrench,
+    });
+    write_recording(&plate.at("mm.mcap"), &Topics::default(), "object", "stylus", in_mm).unwrap();
+    let tip = ["--tip-radius-mm", "1.5"];
+    let poses = refine(&plate.at("scan.ply"), &plate.at("mm.mcap"), &plate.at("out.ply"), &tip);
+    let with_pitch = |pitch_mm: f64| {
+        let scene = plate.at("fine.yaml");
+        fs::write(&scene, format!("tip: {{ radius_mm: 1.5 }}\npatch: {{ pitch_mm: {pitch_mm} }}\n")).unwrap();
+        plate.refine("out.ply", &["--scene", scene.to_str().unwrap()])
+    };
+    let refused = [
+        (poses, "the poses look like mm"),
+        (plate.refine("out.ply", &["--tip-radius-mm", "0.0015"]), "tip.radius_mm is 0.0015"),
+        (plate.refine("out.ply", &["--tip-radius-mm", "1e-6"]), "tip.radius_mm is 1e-6"),
+        (with_pitch(0.02), "around one contact of a tip of 1.5 mm would have 3.9e7 nodes and take 15.5 GB"),
+        (with_pitch(0.08), "around all that was touched would have"),
+    ];
+    for (output, why) in refused {
+        assert!(code(&output) == 3 && stderr(&output).contains(why), "{why}: {}", stderr(&output));
+        assert!(stderr(&output).lines().count() == 1 && !plate.at("out.ply").exists(), "{}", stderr(&output));
+    }
 }
 
 #[test]

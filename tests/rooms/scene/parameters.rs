@@ -280,7 +280,9 @@ fn scene(key: &str, value: &str) -> String {
     };
     let inner =
         section.rsplit('.').fold(format!("{with}{name}: {value}"), |inner, name| format!("{name}: {{ {inner} }}"));
-    let others = ["tip", "contact"].into_iter().filter(|other| *other != section).map(|other| format!(", {other}: "));
+    // a ball of radius 0 has no patch
+    let others = [("tip", ""), ("contact", ""), ("patch", "off")].into_iter().filter(|(other, _)| *other != section);
+    let others = others.map(|(other, value)| format!(", {other}: {value}"));
     format!("{{ {inner}{} }}", others.collect::<String>())
 }
 

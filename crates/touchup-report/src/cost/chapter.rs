@@ -80,7 +80,7 @@ impl Cost {
             |ratio: fn(&SizeCost) -> Spread| self.sizes.iter().map(|size| ratio(size).median).max_by(f64::total_cmp);
         let (worst, keeping) = (largest(|size| size.barest_to_minimal)?, largest(|size| size.barest_to_keeping)?);
         Some(format!(
-            "What a scene does not name costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
+            "A part that a scene says is off costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
              that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
              loop made to keep what it looked up, as the refiner does (which boxes to bring up to date, with a margin, and what \
              is near), it is {keeping:.3} times.",

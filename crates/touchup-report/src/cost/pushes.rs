@@ -14,7 +14,8 @@ use touchup_session::scene::Scene;
 use touchup_sim::wavy::{SIDE, plate, slide_on};
 
 /// The cheapest scene that moves a mesh: the touched face follows the ball, without further stages.
-pub const BAREST: &str = "tip:\nrefine: { roi_mm: 0, beta_per_n2_s: 0 }\n";
+pub const BAREST: &str = "{ refine: { roi_mm: 0, beta_per_n2_s: 0 }, sync: off, clock: off, contact: off, scan: off, sliding: off, carve: off, \
+                          guard: off, patch: off, uncertainty: off }\n";
 
 /// Length of the short edges of a scan that grows with its faces, m.
 const EDGE: f64 = 1e-3;

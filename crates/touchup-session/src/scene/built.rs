@@ -1,4 +1,4 @@
-//! What a scene costs: the parts that are built of it, those that are left out, and the memory that is taken at start.
+//! What a scene costs: the parts that are built of it, those that are left out and why, and the memory that is taken at start.
 
 use std::fmt;
 
@@ -13,9 +13,25 @@ use touchup_core::haptic::Footprint;
 pub struct Built {
     /// there, and paid for
     pub built: Vec<&'static str>,
-    /// not there
-    pub left_out: Vec<&'static str>,
+    /// neither allocated nor run
+    pub left_out: Vec<LeftOut>,
 }
+
+/// A part that is not built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// by its name in the YAML
+    pub part: &'static str,
+    /// why: the scene, its mode, or the task at hand
+    pub reason: &'static str,
+}
+
+const OFF: &str = "off in the scene";
+const NOT_NAMED: &str = "not named in the scene";
+const PUBLISHED: &str = "the published rule has none";
+const NOTHING_MOVES: &str = "nothing moves the mesh";
+const NO_PATCH: &str = "of the patch, which is left out";
+const NOT_COMPILED: &str = "not in this build of touchup";
 
 reported! {
     /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined scan, with the trees over it. What was
@@ -45,45 +61,64 @@ pub struct SceneCost {
 }
 
 impl Scene {
-    /// What is built of the scene. The mode of the paper leaves out much that may be named all the same.
+    /// What is built of the scene, and why the rest is not.
     ///
-    /// - `unused`: parts that the verb at hand has no use for, by name.
+    /// - `unused`: parts that the task at hand has no use for, each with the reason.
     /// - `features`: those that the program can be built with, and whether it was.
-    pub fn built(&self, unused: &[&str], features: &[(&'static str, bool)]) -> Built {
-        let is_robust = self.refine.as_ref().is_some_and(|refine| refine.mode == Mode::Robust);
-        let has_patch = self.patch.is_some() && self.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust);
+    pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> Built {
+        let unless = |is_there: bool, reason| if is_there { None } else { Some(reason) };
+        let not_robust = match &self.refine {
+            None => Some(NOTHING_MOVES),
+            Some(refine) => unless(refine.mode == Mode::Robust, PUBLISHED),
+        };
+        let not_either = not_robust.filter(|_| !self.has_patch());
         let parts = [
-            ("sync", self.sync.is_some()),
-            ("clock", self.clock.is_some()),
-            ("markers", self.markers.is_some()),
-            ("scan_to_space", self.scan_to_space.is_some()),
-            ("compensation", self.compensation.is_some()),
-            ("bias_tracking", self.bias_tracking.is_some() && is_robust),
-            ("contact", self.contact.is_some() && is_robust),
-            ("tip", self.tip.is_some()),
-            ("scan", self.scan.is_some()),
-            ("scan.region", self.region().is_some()),
-            ("sliding", self.sliding.is_some() && (is_robust || has_patch)),
-            ("carve", self.carve.is_some() && (is_robust || has_patch)),
-            ("guard", self.guard.is_some() && is_robust),
-            ("patch", has_patch),
-            ("uncertainty", self.uncertainty.is_some() && has_patch),
-            ("robot", self.robot.is_some()),
-            ("refine", self.refine.is_some()),
+            ("sync", unless(self.sync.is_some(), OFF)),
+            ("clock", unless(self.clock.is_some(), OFF)),
+            ("markers", unless(self.markers.is_some(), NOT_NAMED)),
+            ("scan_to_space", unless(self.scan_to_space.is_some(), NOT_NAMED)),
+            ("compensation", unless(self.compensation.is_some(), NOT_NAMED)),
+            ("bias_tracking", unless(self.bias_tracking.is_some(), NOT_NAMED).or(not_robust)),
+            ("contact", unless(self.contact.is_some(), OFF).or(not_robust)),
+            ("tip", unless(self.tip.is_some(), OFF)),
+            ("scan", unless(self.scan.is_some(), OFF)),
+            ("scan.region", unless(self.region().is_some(), NOT_NAMED)),
+            ("sliding", unless(self.sliding.is_some(), OFF).or(not_either)),
+            ("carve", unless(self.carve.is_some(), OFF).or(not_either)),
+            ("guard", unless(self.guard.is_some(), OFF).or(not_robust)),
+            ("patch", unless(self.patch.is_some(), OFF).or(unless(self.has_patch(), PUBLISHED))),
+            ("uncertainty", unless(self.uncertainty.is_some(), OFF).or(unless(self.has_patch(), NO_PATCH))),
+            ("robot", unless(self.robot.is_some(), NOT_NAMED)),
+            ("refine", unless(self.refine.is_some(), OFF)),
         ];
-        let (built, left_out): (Vec<_>, Vec<_>) = parts
-            .into_iter()
-            .chain(features.iter().copied())
-            .partition(|(name, is_built)| *is_built && !unused.contains(name));
-        let names = |parts: Vec<(&'static str, bool)>| parts.into_iter().map(|(name, _)| name).collect();
-        Built { built: names(built), left_out: names(left_out) }
+        let compiled = features.iter().map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
+        let mut built = Built { built: Vec::new(), left_out: Vec::new() };
+        for (part, reason) in parts.into_iter().chain(compiled) {
+            let of_task = unused.iter().find(|left| left.part == part).map(|left| left.reason);
+            match reason.or(of_task) {
+                Some(reason) => built.left_out.push(LeftOut { part, reason }),
+                None => built.built.push(part),
+            }
+        }
+        built
     }
 }
 
+/// Those that are left out stand together by their reason.
 impl fmt::Display for Built {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let list = |names: &[&str]| if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
-        write!(f, "built: {}; left out: {}", list(&self.built), list(&self.left_out))
+        let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
+        for &LeftOut { part, reason } in &self.left_out {
+            match by_reason.iter_mut().find(|(known, _)| *known == reason) {
+                Some((_, parts)) => parts.push(part),
+                None => by_reason.push((reason, vec![part])),
+            }
+        }
+        let left_out: Vec<_> =
+            by_reason.iter().map(|(reason, parts)| format!("{} ({reason})", parts.join(", "))).collect();
+        write!(f, "built: {}; left out: ", list(&self.built))?;
+        if left_out.is_empty() { f.write_str("nothing") } else { f.write_str(&left_out.join("; ")) }
     }
 }
 

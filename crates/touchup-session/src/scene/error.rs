@@ -43,6 +43,19 @@ pub enum SceneError {
         /// section and key
         needs: &'static str,
     },
+    /// A part cannot be built without another one.
+    #[error("{part} needs {needs}: name it, or say `{part}: off`")]
+    Unmet {
+        /// by its name
+        part: &'static str,
+        /// section, or section and key
+        needs: &'static str,
+    },
+    /// Neither a flag nor the scene tells the radius of the ball.
+    #[error(
+        "the radius of the ball is not known: give --tip-radius-mm, or tip.radius_mm in the scene (`touchup init` writes one)"
+    )]
+    NoRadius,
     /// A file whose form cannot be edited without harm to the rest of it.
     #[error("the scene cannot be edited ({why}); put this in by hand: {settings}")]
     CannotEdit {

@@ -1,8 +1,9 @@
 //! The YAML that names the parts of a scene and their parameters, turned into the modules' own settings.
 //!
-//! A part that is not named is not built: a scene that names only `refine` is the bare loop. A part that is named
-//! without keys takes its defaults. Each parameter is declared once, by [`touchup_core::parameters!`], in the module that it belongs to;
-//! `config/default.yaml` is [`Scene::template`] and docs/scene.md is [`Scene::table`].
+//! A scene says what differs: what a right result needs is built unless the scene says `off`, as in `patch: off`; what only some sensors
+//! need is built where it is named. A part without keys takes its defaults. Each parameter is declared once, by
+//! [`touchup_core::parameters!`], in the module that it belongs to; `config/default.yaml` is [`Scene::template`] and docs/scene.md is
+//! [`Scene::table`].
 
 mod arm_check;
 mod built;
@@ -16,7 +17,7 @@ mod template;
 use std::path::{Path, PathBuf};
 
 pub use arm_check::{CheckDoubt, CheckRecord, CheckRecordError, CheckStanding};
-pub use built::{Built, Memory, SceneCost};
+pub use built::{Built, LeftOut, Memory, SceneCost};
 pub use edit::Setting;
 use error::yaml_error;
 pub use error::{SceneError, nearest};
@@ -34,17 +35,17 @@ use touchup_core::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
 
 parameters! {
-    /// The parts of a scene. `None`: not built.
+    /// The parts of a scene. `None`: not built. Those with a default are built unless the scene says `off`.
     ///
     /// By default all but compensation, which depends on the sensor, and the parts that only some sensors need.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Scene in "" {
-        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Not named: only messages of equal stamp
+        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off: only messages of equal stamp
         /// pair.
-        sync: Option<SyncParams> = Some(SyncParams::default()), "sync";
+        sync: Option<SyncParams> = Some(Default::default()), "sync";
         /// Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and never applied
-        /// unasked. It has no keys. Not named: it is not estimated.
-        clock: Option<ClockSection> = Some(ClockSection::default()), "clock";
+        /// unasked. It has no keys. Off: it is not estimated.
+        clock: Option<ClockSection> = Some(Default::default()), "clock";
         /// The markers on the stylus, for recordings that hold them in place of its pose (--markers-topic): a rigid body is pulled to
         /// the markers that are seen by springs and dampers. The values are those of the simulated stylus.
         markers: Option<MarkersSection> = None, "markers";
@@ -56,36 +57,36 @@ parameters! {
         compensation: Option<CompensationSection> = None, "compensation";
         /// Follows the slow drift of the sensor while nothing is touched. Not named: the bias stays as it is named.
         bias_tracking: Option<BiasParams> = None, "bias_tracking";
-        /// Separates contact from free motion by the measured force. Not named: every sample counts as contact.
-        contact: Option<ContactGateParams> = Some(ContactGateParams::default()), "contact";
+        /// Separates contact from free motion by the measured force. Off: every sample counts as contact.
+        contact: Option<ContactGateParams> = Some(Default::default()), "contact";
         /// The tip that touches: a ball, the flat end of a cylinder, or a cone with a round nose. The origin of the pose is the centre
-        /// of the ball or nose, or the middle of the flat end; its z runs along the shaft, from the tip to the handle. Not named: a
+        /// of the ball or nose, or the middle of the flat end; its z runs along the shaft, from the tip to the handle. Off: a
         /// rigid point.
-        tip: Option<TipSection> = Some(TipSection::default()), "tip";
-        /// The scan, and how good it is. Not named: it counts as free of noise.
-        scan: Option<ScanSection> = Some(ScanSection::default()), "scan";
-        /// Takes friction out of the measured normal while the ball slides, in the haptic update and in the patch. Not named: the force
+        tip: Option<TipSection> = Some(Default::default()), "tip";
+        /// The scan, and how good it is. Off: it counts as free of noise.
+        scan: Option<ScanSection> = Some(Default::default()), "scan";
+        /// Takes friction out of the measured normal while the ball slides, in the haptic update and in the patch. Off: the force
         /// is the normal. All but the cone is for the haptic update, which knows the past alone; the patch looks ahead and finds its
         /// own.
-        sliding: Option<SlidingParams> = Some(SlidingParams::default()), "sliding";
-        /// Free space: what the tip passes through without a force is not there, in the haptic update and in the patch. Not named: lids
+        sliding: Option<SlidingParams> = Some(Default::default()), "sliding";
+        /// Free space: what the tip passes through without a force is not there, in the haptic update and in the patch. Off: lids
         /// over holes stay. The keys are for the haptic update; in the patch free space counts as touches do.
-        carve: Option<CarveParams> = Some(CarveParams::default()), "carve";
-        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Not named: anything goes, as in the paper,
+        carve: Option<CarveParams> = Some(Default::default()), "carve";
+        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Off: anything goes, as in the paper,
         /// and a noisy scan may blow up.
-        guard: Option<GuardParams> = Some(GuardParams::default()), "guard";
+        guard: Option<GuardParams> = Some(Default::default()), "guard";
         /// Reconstructs the surface where it was touched, finer than the scan: edges are sharp, closed holes open, and what was not
-        /// touched stays as it was. Not named: the triangles of the scan stay and are only moved.
-        patch: Option<PatchParams> = Some(PatchParams::default()), "patch";
+        /// touched stays as it was. Off: the triangles of the scan stay and are only moved.
+        patch: Option<PatchParams> = Some(Default::default()), "patch";
         /// Reports how well each vertex is known (sigma_mm in the PLY), and rejects touches that contradict their place as outliers. A
-        /// second pass that confirms the contradiction moves the place. Needs patch. Not named: every touch counts, and nothing is
+        /// second pass that confirms the contradiction moves the place. Needs patch. Off: every touch counts, and nothing is
         /// reported.
-        uncertainty: Option<UncertaintyParams> = Some(UncertaintyParams::default()), "uncertainty";
+        uncertainty: Option<UncertaintyParams> = Some(Default::default()), "uncertainty";
         /// The arm that holds a probe (`touchup probe`, docs/probing.md). Not named: nothing is probed. A request can ask for less than
         /// these limits, never for more. It needs a ball for a tip, and scan_to_space says where the scan lies in its base.
         robot: Option<RobotSection> = None, "robot";
-        /// Moves the mesh until measured and expected force agree. Not named: nothing moves it.
-        refine: Option<RefineSection> = Some(RefineSection::default()), "refine";
+        /// Moves the mesh until measured and expected force agree. Off: nothing moves it.
+        refine: Option<RefineSection> = Some(Default::default()), "refine";
     }
 }
 
@@ -121,6 +122,22 @@ impl Scene {
         scene.get(section).and_then(|section| section.get(key)).is_some_and(|value| !value.is_null())
     }
 
+    /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The default is nobody's word.
+    ///
+    /// - `yaml`: text of the scene; empty for none.
+    ///
+    /// # Errors
+    /// [`SceneError::NoRadius`] where nobody did.
+    pub fn tell_radius(&mut self, yaml: &str, radius_mm: Option<f64>) -> Result<(), SceneError> {
+        match radius_mm {
+            Some(radius_mm) => self.tip.get_or_insert_default().ball.radius = radius_mm / 1e3,
+            // a rigid point has none
+            None if self.tip.is_none() || Self::names(yaml, "tip", "radius_mm") => {}
+            None => return Err(SceneError::NoRadius),
+        }
+        Ok(())
+    }
+
     /// The scan that the scene names, and the unit of its coordinates.
     ///
     /// - `path`: of the scene.
@@ -139,7 +156,8 @@ impl Scene {
     /// ```
     /// let scene = touchup_session::scene::Scene::from_yaml("contact: { on_n: 0.5 }")?;
     /// assert_eq!(scene.contact.unwrap().on, 0.5);
-    /// assert!(scene.sync.is_none());
+    /// assert!(scene.patch.is_some() && scene.robot.is_none());
+    /// assert!(touchup_session::scene::Scene::from_yaml("patch: off")?.patch.is_none());
     /// # Ok::<(), touchup_session::scene::SceneError>(())
     /// ```
     pub fn from_yaml(yaml: &str) -> Result<Self, SceneError> {
@@ -175,8 +193,6 @@ impl Scene {
                 "robot",
                 "tip.shape: ball and tip.radius_mm above 0",
             ),
-            (self.patch.is_some() && radius <= 0.0 && shape != Some(ShapeName::Cone), "patch", "tip.radius_mm above 0"),
-            (self.patch.is_some() && self.contact.is_none(), "patch", "contact"),
             (
                 self.robot.as_ref().is_some_and(|robot| robot.model == ArmModel::Urdf && robot.urdf.is_none()),
                 "robot.model: urdf",
@@ -188,6 +204,14 @@ impl Scene {
             }
         }
         TipBody::new(self.tip_shape(), radius)?;
+        for (is_missing, needs) in [
+            (radius <= 0.0 && shape != Some(ShapeName::Cone), "tip.radius_mm above 0"),
+            (self.contact.is_none(), "contact"),
+        ] {
+            if self.has_patch() && is_missing {
+                return Err(SceneError::Unmet { part: "patch", needs });
+            }
+        }
         Ok(())
     }
 }

@@ -20,7 +20,7 @@ use touchup_core::stylus::{
 use touchup_sim::ArmParams;
 
 impl Scene {
-    /// Settings of the synchroniser; without `sync` only messages of equal stamp pair.
+    /// Settings of the synchroniser; with `sync: off` only messages of equal stamp pair.
     pub fn sync_params(&self) -> SyncParams {
         self.sync.unwrap_or(SyncParams { reorder_ns: 0, largest_gap_ns: 0, ..SyncParams::default() })
     }
@@ -95,7 +95,7 @@ impl Scene {
         }
     }
 
-    /// The ball; a rigid point when the scene names none.
+    /// The ball; a rigid point when the scene says `tip: off`.
     pub fn tip_params(&self) -> TipParams {
         self.tip.as_ref().map_or(TipParams { radius: 0.0, stiffness: None }, |tip| tip.ball)
     }
@@ -105,7 +105,7 @@ impl Scene {
         self.tip.as_ref().map_or(TipShape::Ball, TipSection::tip_shape)
     }
 
-    /// Standard deviation of the scan, m; 0 when the scene names none.
+    /// Standard deviation of the scan, m; 0 when the scene says `scan: off`.
     fn scan_noise(&self) -> f64 {
         self.scan.as_ref().map_or(0.0, |scan| scan.quality.noise)
     }
@@ -134,12 +134,14 @@ impl Scene {
         Some(params)
     }
 
+    /// Whether the touched surface is reconstructed; the published rule moves triangles alone.
+    pub(super) fn has_patch(&self) -> bool {
+        self.patch.is_some() && self.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust)
+    }
+
     /// Settings of the patcher; `None` without `patch` or `contact`, and in the mode of the paper.
     pub fn patcher_params(&self) -> Option<PatcherParams> {
-        let PatchParams { pitch, most_faces } = self.patch.filter(|_| self.contact.is_some())?;
-        if self.refine.as_ref().is_some_and(|refine| refine.mode == Mode::Paper) {
-            return None;
-        }
+        let PatchParams { pitch, most_faces } = self.patch.filter(|_| self.has_patch() && self.contact.is_some())?;
         let (shape, TipParams { radius, stiffness }, noise) = (self.tip_shape(), self.tip_params(), self.scan_noise());
         // a tip that cannot be is refused by the patcher
         let mut params = PatcherParams::for_tip(shape, radius, stiffness, noise)

@@ -6,8 +6,8 @@ use super::Scene;
 
 const HEAD: &str = "\
 # The scene that `touchup refine` uses when none is given. Copy it, change what differs, and give it by --scene.
-# A part that is not named is not built; a part named without keys takes the values below. Flags override both.
-# A line that begins with #key is a setting that is off here.
+# What is not named is as it is here: leave out what does not differ. A part is not built where the scene says off, as in `patch: off`.
+# A line that begins with #key is a setting that is off here. Flags override all.
 # Written from the definition of the parameters, as docs/scene.md is, which has their ranges.
 ";
 
@@ -15,8 +15,9 @@ const TABLE_HEAD: &str = "\
 # The scene
 
 Every key of the YAML that `--scene` names, written from the definition of the parameters as
-[`config/default.yaml`](../config/default.yaml) is. A part that is not named is not built; a part named without keys takes the defaults. A
-number outside its range is refused by its key, an unknown key with its line and column.
+[`config/default.yaml`](../config/default.yaml) is. A scene says what differs: what is not named takes its default, and a part is not built
+where the scene says `off`, as in `patch: off`. Parts that are off in the default scene are built where they are named; a name alone gives them
+their defaults. A number outside its range is refused by its key, an unknown key with its line and column.
 ";
 
 /// Letters of a line of comment at most.

@@ -146,6 +146,7 @@ impl Bench {
         let text = |path: PathBuf| ParameterValue::String(path.to_str().unwrap().to_owned());
         parameters.set("scan", &text(plate.path("scan.ply"))).unwrap();
         parameters.set("session_folder", &text(plate.path("sessions"))).unwrap();
+        parameters.set("tip_radius_mm", &ParameterValue::Double(1.5)).unwrap();
         for (name, value) in set {
             parameters.set(name, value).unwrap();
         }

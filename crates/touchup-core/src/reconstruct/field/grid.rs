@@ -1,7 +1,10 @@
 //! The field at the nodes of the lattice, around everything that was touched or swept.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point3;
 
+use crate::numeric::{VoxelKey, voxel_neighbourhood, voxel_of};
 use crate::reconstruct::evidence::point_evidence::{
     Evidence, FREE_REACH, NodeState, SCAN_REMOVAL, SWEPT_REACH, Source,
 };
@@ -282,6 +285,19 @@ impl ReconstructionGrid {
 /// How many nodes of a lattice of `pitch` (m) are looked at around one contact of a tip of `radius` (m).
 pub(in crate::reconstruct) fn nodes_around_contact(radius: f64, pitch: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * (REACH * radius / pitch).powi(3)
+}
+
+/// About as many nodes are looked at around all of `contacts`: those of the cubes of half the reach that are next to one with a contact. Along
+/// a sheet these are three cubes high where what is looked at is four, which is made up for.
+pub(in crate::reconstruct) fn nodes_around_contacts(
+    contacts: impl Iterator<Item = Point3<f64>>,
+    radius: f64,
+    pitch: f64,
+) -> f64 {
+    let edge = REACH * radius / 2.0;
+    let touched: BTreeSet<VoxelKey> = contacts.map(|contact| voxel_of(&contact, edge)).collect();
+    let around: BTreeSet<VoxelKey> = touched.into_iter().flat_map(voxel_neighbourhood).collect();
+    around.len() as f64 * 4.0 / 3.0 * (edge / pitch).powi(3)
 }
 
 /// The steps from a node to those within `radius` steps.

@@ -13,7 +13,7 @@ use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, Nod
 use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
-use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid, nodes_around_contact};
+use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid, nodes_around_contact, nodes_around_contacts};
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::uncertainty::vertex_sigma;
@@ -113,16 +113,21 @@ impl PatcherParams {
 
     /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built before.
     fn check_cost(&self) -> Result<(), SettingError> {
-        let nodes = nodes_around_contact(self.evidence.radius, self.pitch);
-        let finest = self.pitch * (nodes / MOST_NODES).cbrt();
+        let around = format!("one contact of a tip of {} mm", self.evidence.radius * 1e3);
+        self.check_nodes(nodes_around_contact(self.evidence.radius, self.pitch), MOST_NODES, &around)
+    }
+
+    /// Refuses a lattice of more than `most` nodes.
+    ///
+    /// - `around`: what it is around.
+    fn check_nodes(&self, nodes: f64, most: f64, around: &str) -> Result<(), SettingError> {
         let why = format!(
-            "{:.2e} or more: the lattice around one contact of a tip of {} mm would have {nodes:.1e} nodes and take {:.1} GB; \
-             a larger patch.pitch_mm takes less",
-            finest * 1e3,
-            self.evidence.radius * 1e3,
+            "{:.2e} or more: the lattice around {around} would have {nodes:.1e} nodes and take {:.1} GB; a larger \
+             patch.pitch_mm takes less",
+            self.pitch * (nodes / most).cbrt() * 1e3,
             nodes * NODE_BYTES * 1e-9,
         );
-        SettingError::check("patch.pitch_mm", self.pitch * 1e3, nodes <= MOST_NODES, &why)
+        SettingError::check("patch.pitch_mm", self.pitch * 1e3, nodes <= most, &why)
     }
 
     /// # Errors
@@ -212,6 +217,8 @@ impl LivePatch {
 const SMALLEST_TIP: f64 = 1e-5;
 /// Nodes around one contact at most: a ball of 1.5 mm on a lattice of 0.042 mm.
 const MOST_NODES: f64 = 4e6;
+/// Nodes around all that was touched at most: 3.2 GB.
+const MOST_NODES_IN_ALL: f64 = 8e6;
 /// Memory of a node while the field around it is made: its state, the scan's distance, its numbers, tables that are half full.
 const NODE_BYTES: f64 = 400.0;
 /// Edge of the cells of one mean contact, in radii.
@@ -280,6 +287,16 @@ impl Patcher {
     /// is complete.
     pub fn push(&mut self, sample: &ContactSample) {
         self.finder.push(sample, |touch| keep(&mut self.history, &self.params, &touch));
+    }
+
+    /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any of it is made.
+    ///
+    /// # Errors
+    /// [`SettingError`] of `patch.pitch_mm`, with nodes and memory.
+    pub fn check_extent(&self) -> Result<(), SettingError> {
+        let means = self.history.contacts.means().iter().map(|mean| mean.point);
+        let nodes = nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch);
+        self.params.check_nodes(nodes, MOST_NODES_IN_ALL, "all that was touched")
     }
 
     /// The touches themselves, in order of time.

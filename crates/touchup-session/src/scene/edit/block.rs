@@ -54,7 +54,7 @@ fn set_in(
             let inner = body.clone().map(|at| lines[at]).find(|line| is_content(line)).map(indent_of);
             set_in(lines, body, inner.unwrap_or(indent + STEP), rest, value, remark)
         }
-        "~" | "null" => {
+        "~" | "null" | "off" => {
             let line = lines[key_line].replacen(inline, "", 1);
             let mut lines = lines.to_vec();
             lines[key_line] = &line;

@@ -24,7 +24,7 @@ pub(super) fn set(text: &str, begin: usize, path: &[&str], value: &str) -> Optio
     };
     let old = &text[entry.begin..entry.end];
     match old.trim_start() {
-        "" | "~" | "null" => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
+        "" | "~" | "null" | "off" => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
         _ if rest.is_empty() => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
         old if old.starts_with('{') => set(text, entry.end - old.len(), rest, value),
         _ => None,
