@@ -20,8 +20,17 @@ pub(super) trait During<T> {
 
 impl<T, E: Debug> During<T> for Result<T, E> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
-        let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
-        self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
+        self.map_err(|error| {
+            let reason = format!("{error:?}");
+            // RustDDS does not always say why it has no socket
+            let remedy = if reason.contains("open files") {
+                "a node takes some 250: allow the process more (ulimit -n)"
+            } else {
+                "is the network up (ip link show lo), are there fewer than 120 nodes in this domain, and may the process open 300 \
+                 files (ulimit -n)?"
+            };
+            RosError::Refused { call, reason, remedy }
+        })
     }
 }
 
@@ -67,4 +76,19 @@ fn guard(before: std::io::Result<OpenSockets>, localhost_only: bool) -> Result<(
         Err(error) => tracing::warn!(%error, "messages of any size are taken from the network"),
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_has_no_more_files_is_not_sent_to_the_network() {
+        // EMFILE
+        let refused: Result<(), _> = Err(std::io::Error::from_raw_os_error(24)).during("publishing a topic");
+        let said = refused.unwrap_err().to_string();
+        assert!(said.contains("ulimit -n") && !said.contains("ip link"), "{said}");
+        let refused: Result<(), _> = Err("no such interface").during("joining the domain");
+        assert!(refused.unwrap_err().to_string().contains("ip link show lo"));
+    }
 }
