@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs every test: cargo test, then tests/python against the binary that it built.
+# Runs every test: cargo test, a minute of fuzz/run, then tests/python against the binary that it built.
 #
 #   tests/all.sh [--full]      --full: also the slow proofs (more seeds, sweeps, judged cases, RViz, Fast DDS over networks of
 #                              its own); what they measured goes into docs/results.md, with date, commit and machine
@@ -124,6 +124,16 @@ python_tests() {
   if [ "$status" -ne 0 ] && ! grep -q '^failed ' <<<"$summary"; then fail "pytest ended with $status, see $logs/python.log"; fi
 }
 
+# a target counts as a test
+fuzz_targets() {
+  fuzz/run 60 2>&1 | tee "$logs/fuzz.log"
+  local passed_here line
+  passed_here=$(sed -n 's/^[0-9]* executions: \([0-9]*\) passed, .*/\1/p' "$logs/fuzz.log")
+  [ -n "$passed_here" ] || { fail "fuzz/run did not count, see $logs/fuzz.log"; return; }
+  passed=$((passed + passed_here))
+  while read -r line; do fail "${line#failed: }"; done < <(grep '^failed: ' "$logs/fuzz.log")
+}
+
 # of a report in JUnit's form: how many passed, then a line for each that failed or was skipped
 counted_by_pytest() {
   "$venv/bin/python" - "$1" <<'PYTHON'
@@ -152,6 +162,7 @@ stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${ur[@]}" "${progra
 # with them the node on r2r, of which without ROS only its parts can run
 stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace "${unoptimised[@]}" "${ur[@]}" --features r2r-check --lib --bins
 stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
+stage "Fuzzing" fuzz_targets
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
 elif stage "Python packages" python_is_ready "$packages" && [ -e "$venv.made" ]; then

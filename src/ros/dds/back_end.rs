@@ -9,6 +9,7 @@ use ros2_client::{Context, Node, NodeName, NodeOptions};
 use super::answers::Room;
 use super::graph::DdsGraph;
 use super::incoming::Listener;
+use super::sockets::{OpenSockets, Range};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::{Exchange, RosError};
 
@@ -19,8 +20,17 @@ pub(super) trait During<T> {
 
 impl<T, E: Debug> During<T> for Result<T, E> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
-        let remedy = "is the network up (ip link show lo), and are there fewer than 120 nodes in this domain?";
-        self.map_err(|error| RosError::Refused { call, reason: format!("{error:?}"), remedy })
+        self.map_err(|error| {
+            let reason = format!("{error:?}");
+            // RustDDS does not always say why it has no socket
+            let remedy = if reason.contains("open files") {
+                "a node takes some 250: allow the process more (ulimit -n)"
+            } else {
+                "is the network up (ip link show lo), are there fewer than 120 nodes in this domain, and may the process open 300 \
+                 files (ulimit -n)?"
+            };
+            RosError::Refused { call, reason, remedy }
+        })
     }
 }
 
@@ -43,10 +53,42 @@ pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context
     if config.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
     }
+    let before = OpenSockets::now();
     let participant = builder.build().during("joining the domain")?;
+    guard(before, config.localhost_only)?;
     let context = Context::from_domain_participant(participant).during("joining the graph")?;
     let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
     let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
     let node = context.new_node(name, options).during("making the node")?;
     Ok((context, node))
+}
+
+/// A node that others must not reach does not run where they do; without a filter for what is too large it does.
+fn guard(before: std::io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
+    let range = if localhost_only { Range::Computer } else { Range::Networks };
+    match before.and_then(|before| before.guard_since(range)) {
+        Ok(guarded) => tracing::debug!(guarded, ?range, "sockets are guarded"),
+        Err(error) if localhost_only => {
+            let remedy =
+                "unset ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY where other computers may reach the node";
+            return Err(RosError::Refused { call: "binding to loopback", reason: error.to_string(), remedy });
+        }
+        Err(error) => tracing::warn!(%error, "messages of any size are taken from the network"),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_has_no_more_files_is_not_sent_to_the_network() {
+        // EMFILE
+        let refused: Result<(), _> = Err(std::io::Error::from_raw_os_error(24)).during("publishing a topic");
+        let said = refused.unwrap_err().to_string();
+        assert!(said.contains("ulimit -n") && !said.contains("ip link"), "{said}");
+        let refused: Result<(), _> = Err("no such interface").during("joining the domain");
+        assert!(refused.unwrap_err().to_string().contains("ip link show lo"));
+    }
 }

@@ -14,6 +14,7 @@ mod keep_alive;
 mod rosout;
 mod samples;
 mod services;
+mod sockets;
 mod topics;
 
 use std::sync::mpsc::sync_channel;

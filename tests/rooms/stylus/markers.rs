@@ -277,6 +277,14 @@ fn the_order_of_arrival_does_not_matter() {
     assert_eq!((wild.frame_counts().duplicate, wild.frame_counts().jump), (1, 1));
 }
 
+/// After the pose of the first frame, ten milliseconds up to the last nanosecond that there is hold ten multiples of the period.
+#[test]
+fn at_the_end_of_time_the_poses_end() {
+    let frames: Vec<_> = (0..3).map(|i| frame(i64::MAX - (2 - i) * 5 * MS, &pose(0.0), 0..6, still)).collect();
+    let poses = filtered(&mut filter(MarkerParams::default()), frames);
+    assert_eq!((poses.len(), poses[10].stamp_ns), (11, i64::MAX / MS * MS));
+}
+
 /// Against the closed-form fit of each frame alone, at the ball, 150 mm off the markers.
 #[test]
 fn the_noise_at_the_ball_is_less_than_that_of_each_frame() {

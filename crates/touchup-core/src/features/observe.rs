@@ -241,7 +241,8 @@ pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
     let mut last: Option<(u32, i64)> = None;
     let mut group = 0;
     let mut number = |touch: &ProbedPoint| {
-        let is_same = last.is_some_and(|(stroke, begun)| touch.stroke == stroke && touch.stamp_ns - begun < SHARED_NS);
+        let is_same = last
+            .is_some_and(|(stroke, begun)| touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS);
         if !is_same {
             group += u32::from(last.is_some());
             last = Some((touch.stroke, touch.stamp_ns));

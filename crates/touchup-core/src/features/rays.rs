@@ -4,6 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
+/// A line is followed in so many pieces at most: a void may be narrower than any number of pieces can be.
+const MOST_PIECES: f64 = 1000.0;
+
 /// Casts rays through one mesh.
 pub(super) struct Rays<'a> {
     mesh: &'a TriMesh,
@@ -30,7 +33,7 @@ impl<'a> Rays<'a> {
 
     /// The first face between `from` and the point `reach` (m) away along the unit vector `direction`.
     pub fn first(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> Option<RayHit> {
-        let count = (reach / self.piece).ceil().max(1.0);
+        let count = (reach / self.piece).ceil().clamp(1.0, MOST_PIECES);
         let piece = reach / count;
         for i in 0..count as usize {
             let (a, b) = (from + direction * (piece * i as f64), from + direction * (piece * (i + 1) as f64));
@@ -83,5 +86,7 @@ mod tests {
         assert_eq!((met.face, met.distance), (FaceId(1), 2.5));
         assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 2.0), 2.0, "too short");
         assert_eq!(rays.free(&Point3::new(3.0, 3.0, 5.0), &-Vector3::z(), 9.0), 9.0, "beside both");
+        let mut rays = Rays::new(&mesh, &tree, 1e-300, None);
+        assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0), 2.5, "however small the pieces are");
     }
 }

@@ -1,5 +1,7 @@
 //! Slots and pockets: two planes that face each other over a void.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
@@ -69,6 +71,14 @@ const SAME: f64 = 0.4;
 const ABOUT: f64 = 0.1;
 /// A line that starts on a wall starts this share of the width off it.
 const OFF: f64 = 1e-3;
+/// What is across is looked for up to so many diagonals away, and a void is not wider.
+const FARTHEST: f64 = 1.5;
+/// Pieces in which a line across the part is followed.
+const PIECES: f64 = 64.0;
+/// Faces closer together on a line than this, in diagonals, are one.
+const APART: f64 = 1e-9;
+/// Faces that are met on a line before the wall across: more are no wall.
+const MOST_MET: usize = 8;
 
 /// All slots, and all pockets.
 ///
@@ -76,13 +86,14 @@ const OFF: f64 = 1e-3;
 pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec<Slot>, Vec<Slot>) {
     let planes: Vec<_> = parted.planes().filter(|&(number, ..)| parted.is_strong(number)).collect();
     let (mut slots, mut pockets): (Vec<Slot>, Vec<Slot>) = (Vec::new(), Vec::new());
+    let mut views = BTreeMap::new();
     for (at, &(i, p, n)) in planes.iter().enumerate() {
         for &(j, q, m) in &planes[..at] {
             let is_facing = n.dot(&m) < -PARALLEL && (q - p).dot(&n) > 0.0 && (p - q).dot(&m) > 0.0;
             if !is_facing {
                 continue;
             }
-            let Some((slot, share)) = between(parted, of_face, borders, [i, j]) else { continue };
+            let Some((slot, share)) = between(parted, of_face, borders, &mut views, [i, j]) else { continue };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
             if is_slot && !slot.is_aslant && slot.width < WIDE * slot.depth {
                 slots.push(slot);
@@ -122,22 +133,60 @@ fn is_same_slot(one: &Slot, other: &Slot) -> bool {
         && along.abs() < (one.length + other.length) / 2.0
 }
 
+/// What lies across from a point of a wall.
+struct View {
+    from: Point3<f64>,
+    /// faces on the line along the normal: how far, m, and of which segment; up to the first that is no part of the wall itself,
+    /// however wide the void
+    met: Vec<(f64, u32)>,
+}
+
+impl View {
+    /// The segment that is first met across a void of `width`.
+    fn across(&self, width: f64) -> Option<u32> {
+        let &(distance, segment) = self.met.iter().find(|(distance, _)| *distance >= OFF * width)?;
+        (distance <= (1.1 + OFF) * width).then_some(segment)
+    }
+}
+
+/// What each point of a wall sees: many other walls may face it, and it sees the same.
+fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -> Vec<View> {
+    let mut rays = parted.around(wall).rays(parted.diagonal / PIECES);
+    let farthest = FARTHEST * parted.diagonal;
+    let mut view = |from: Point3<f64>| {
+        let (mut met, mut at) = (Vec::new(), APART * parted.diagonal);
+        while met.len() < MOST_MET && met.last().is_none_or(|&(distance, _)| distance < OFF * farthest) {
+            let Some(hit) = rays.first(&(from + normal * at), normal, farthest - at) else { break };
+            met.push((at + hit.distance, of_face[hit.face.0 as usize]));
+            at += hit.distance + APART * parted.diagonal;
+        }
+        View { from, met }
+    };
+    samples(parted, wall).into_iter().map(&mut view).collect()
+}
+
 /// The void between two walls, and the share of the smaller one that faces the other.
-fn between(parted: &Parted, of_face: &[u32], borders: &Borders, walls: [usize; 2]) -> Option<(Slot, f64)> {
+///
+/// - `seen`: what the walls see that were looked at so far.
+fn between(
+    parted: &Parted,
+    of_face: &[u32],
+    borders: &Borders,
+    seen: &mut BTreeMap<usize, Vec<View>>,
+    walls: [usize; 2],
+) -> Option<(Slot, f64)> {
     let planes = [parted.plane(walls[0])?, parted.plane(walls[1])?];
     let n = planes[0].normal();
     // across from the smaller wall: the larger one may go on far beyond
     let [from, to] =
         if parted.segment(walls[0]).area < parted.segment(walls[1]).area { walls } else { [walls[1], walls[0]] };
     let (normal, opposite) = (parted.plane(from)?.normal(), parted.plane(to)?);
-    let starts = samples(parted, from);
+    let starts = seen.entry(from).or_insert_with(|| views(parted, of_face, from, &normal));
     let mut middles = Vec::new();
-    for p in &starts {
-        let width = opposite.along(p, &normal)?;
-        let met = parted.around(from).rays(width).first(&(p + normal * (OFF * width)), &normal, 1.1 * width);
-        let is_met = met.is_some_and(|met| of_face[met.face.0 as usize] == to as u32);
-        if is_met && width > 0.0 {
-            middles.push(p + normal * (width / 2.0));
+    for view in &*starts {
+        let width = opposite.along(&view.from, &normal)?;
+        if width > 0.0 && view.across(width) == Some(to as u32) {
+            middles.push(view.from + normal * (width / 2.0));
         }
     }
     let share = middles.len() as f64 / starts.len().max(1) as f64;

@@ -26,7 +26,7 @@ impl Default for StrokeUndo {
 impl StrokeUndo {
     /// Begins a stroke when the contact at `stamp_ns` follows none for a while.
     pub fn touch(&mut self, stamp_ns: i64) {
-        if self.last_contact_ns.is_none_or(|last| stamp_ns - last > STROKE_PAUSE_NS) {
+        if self.last_contact_ns.is_none_or(|last| stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS) {
             self.positions.begin();
             self.evidence.begin();
         }

@@ -81,7 +81,7 @@ impl BiasTracker {
             let since_ns = *self.free_since_ns.get_or_insert(tip.stamp_ns);
             if paused {
                 self.free_since_ns = Some(tip.stamp_ns);
-            } else if tip.stamp_ns - since_ns >= self.params.settle_ns {
+            } else if tip.stamp_ns.saturating_sub(since_ns) >= self.params.settle_ns {
                 self.learn(tip.stamp_ns, &rest_t, since_last_ns as f64 * 1e-9);
             }
         }

@@ -118,7 +118,7 @@ impl ClockEstimator {
         }
         let position = tip.pose_ot.translation.vector;
         self.held.push_back(OnsetEntry { stamp_ns: tip.stamp_ns, position, force_o: tip.force_o });
-        if self.onset_ns.is_some_and(|onset_ns| tip.stamp_ns - onset_ns >= AFTER_NS)
+        if self.onset_ns.is_some_and(|onset_ns| tip.stamp_ns.saturating_sub(onset_ns) >= AFTER_NS)
             && let Some(onset_ns) = self.onset_ns.take()
             && let Some(onset) = self.onset(onset_ns)
         {
@@ -129,7 +129,7 @@ impl ClockEstimator {
             self.period = self.mean_period();
         }
         if was_in_contact != is_in_contact {
-            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns - turned_ns >= CALM_NS);
+            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns.saturating_sub(turned_ns) >= CALM_NS);
             if is_in_contact && was_calm && self.onset_ns.is_none() {
                 self.onset_ns = Some(tip.stamp_ns);
             }
@@ -190,18 +190,19 @@ impl ClockEstimator {
     /// Between the samples that are held, s.
     fn mean_period(&self) -> f64 {
         let ends = self.held.front().zip(self.held.back());
-        let span = ends.map_or(0.0, |(first, last)| (last.stamp_ns - first.stamp_ns) as f64 * 1e-9);
+        let span = ends.map_or(0.0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns) as f64 * 1e-9);
         span / (self.held.len().max(2) - 1) as f64
     }
 
     /// `None` when the samples around the onset do not show one.
     fn onset(&self, onset_ns: i64) -> Option<Onset> {
-        let around = self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&(x.stamp_ns - onset_ns)));
-        let of_press = |x: &&OnsetEntry| (0.0..=AFTER).contains(&((x.stamp_ns - onset_ns) as f64 * 1e-9));
+        let around =
+            self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&x.stamp_ns.saturating_sub(onset_ns)));
+        let of_press = |x: &&OnsetEntry| (0.0..=AFTER).contains(&(x.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9));
         let pressed: Vector3<f64> = around.clone().filter(of_press).map(|x| x.force_o).sum();
         let along = direction(&pressed)?;
         let of_entry = |x: &OnsetEntry| {
-            let t = (x.stamp_ns - onset_ns) as f64 * 1e-9;
+            let t = x.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9;
             OnsetSample { t, centre: x.position.dot(&along), force: x.force_o.dot(&along) }
         };
         let mut samples: Vec<OnsetSample> = around.map(of_entry).collect();

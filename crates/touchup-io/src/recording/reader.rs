@@ -275,6 +275,8 @@ fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError> {
         if !segments.is_empty() {
             return Ok(segments.into());
         }
+        let reason = "the folder has no metadata.yaml and no .mcap file with anything in it: nothing was recorded, or it is elsewhere";
+        return Err(RecordingError::NotARecording { path: path.to_owned(), reason: reason.to_owned() });
     }
     let bad = |reason: String| RecordingError::Metadata { path: metadata_path.clone(), reason };
     let text = read_metadata(&metadata_path).map_err(|error| bad(error.to_string()))?;

@@ -2,6 +2,7 @@
 
 use super::*;
 use touchup::haptic::{DynamicsError, GuardParams, RefineError, RoiSize, SlidingParams, StepRule};
+use touchup::reconstruct::{Patcher, PatcherParams};
 use touchup::stylus::{ContactGateParams, SampleError};
 
 /// Samples that no stylus can have sent after one at `tick`.
@@ -76,6 +77,21 @@ fn stamps_at_the_ends_of_time_are_taken() {
         refiner.push(&Sample { stamp_ns, ..sample(0, centre, Vector3::z() * 2.0) }).unwrap();
     }
     assert!(refiner.mesh().positions().iter().all(|p| p.coords.amax() < 0.1));
+}
+
+/// By the reconstruction too: ten samples, a millisecond apart up to the last nanosecond, are one stroke.
+#[test]
+fn touches_at_the_end_of_time_are_taken() {
+    let mut refiner = Refiner::new(bumpy(2), RefineParams::robust(BALL)).unwrap();
+    let mut patcher = Patcher::new(PatcherParams::new(BALL.radius, BALL.stiffness, 0.05e-3)).unwrap();
+    for ago in (0..10).rev() {
+        let stamp_ns = i64::MAX - ago * TICK_NS;
+        refiner.push(&Sample { stamp_ns, ..sample(0, Point3::new(0.0, 0.0, RADIUS), Vector3::z() * 2.0) }).unwrap();
+        patcher.push(refiner.contact().unwrap());
+    }
+    patcher.flush();
+    assert_eq!(patcher.strokes(), 1);
+    assert!(!patcher.probed().is_empty());
 }
 
 /// A solver that gives up refuses the sample as well: mesh and counts stay.

@@ -265,7 +265,13 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
     for name in ["b.mcap", "c.mcap"] {
         fs::remove_file(folder.path().join(name)).unwrap();
     }
-    assert!(matches!(RecordingReader::open(folder.path(), &Topics::default()), Err(RecordingError::Metadata { .. })));
+    // of a session that was ended before the first message nothing is left, or a file that has not begun
+    for begun in [None, Some("0.mcap")] {
+        begun.map(|name| put(folder.path(), name, b"\x89MCAP0\r\n"));
+        let empty = RecordingReader::open(folder.path(), &Topics::default()).err().unwrap();
+        assert!(matches!(empty, RecordingError::NotARecording { .. }), "{empty}");
+        assert!(empty.to_string().contains("nothing was recorded"), "{empty}");
+    }
 }
 
 #[test]

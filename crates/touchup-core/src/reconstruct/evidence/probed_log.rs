@@ -69,7 +69,8 @@ impl ProbedLog {
     /// Keeps a contact, which may be one of two of its touch, unless the last one is too recent.
     pub(in crate::reconstruct) fn note(&mut self, touch: &TipTouch, contact: &SurfaceContact, verdict: Verdict) {
         let is_of_last = self.points.last().is_some_and(|last| last.stamp_ns == touch.stamp_ns);
-        let is_due = self.points.last().is_none_or(|last| touch.stamp_ns - last.stamp_ns >= self.spacing_ns);
+        let is_due =
+            self.points.last().is_none_or(|last| touch.stamp_ns.saturating_sub(last.stamp_ns) >= self.spacing_ns);
         if !is_due && !is_of_last {
             return;
         }

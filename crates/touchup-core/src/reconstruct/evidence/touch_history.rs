@@ -50,7 +50,8 @@ impl TouchHistory {
     pub fn keep(&mut self, touch: &TipTouch) {
         self.until_ns = touch.stamp_ns;
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
-        let is_between_strokes = self.last_contact_ns.is_none_or(|last| touch.stamp_ns - last > STROKE_PAUSE_NS);
+        let is_between_strokes =
+            self.last_contact_ns.is_none_or(|last| touch.stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS);
         let Some(contact) = &touch.contact else {
             // a firm touch of which no contact is known belongs to the stroke that it is in
             if touch.state == TouchState::Free || touch.state == TouchState::Contact && !is_between_strokes {

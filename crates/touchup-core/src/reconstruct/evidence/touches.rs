@@ -133,7 +133,8 @@ impl TouchFinder {
     /// Takes the next sample, which is later than the one before; gives each touch whose window is complete to `each`.
     pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
         let tip = &sample.tip;
-        if self.held.back().is_some_and(|last| tip.stamp_ns - last.stamp_ns > self.params.largest_gap_ns) {
+        if self.held.back().is_some_and(|last| tip.stamp_ns.saturating_sub(last.stamp_ns) > self.params.largest_gap_ns)
+        {
             self.flush(&mut each);
         }
         if let Some(last) = self.held.back() {
@@ -146,11 +147,11 @@ impl TouchFinder {
             force_o: tip.force_o,
             state: sample.state(),
         });
-        while self.held[self.next].stamp_ns + self.params.half_window_ns <= tip.stamp_ns {
+        while tip.stamp_ns.saturating_sub(self.held[self.next].stamp_ns) >= self.params.half_window_ns {
             each(self.touch(self.next));
             self.next += 1;
         }
-        let needed = self.held[self.next.min(self.held.len() - 1)].stamp_ns - self.params.half_window_ns;
+        let needed = self.held[self.next.min(self.held.len() - 1)].stamp_ns.saturating_sub(self.params.half_window_ns);
         while self.held[0].stamp_ns < needed {
             self.held.pop_front();
             self.next -= 1;
@@ -188,7 +189,7 @@ impl TouchFinder {
         let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
         let mut contact = None;
         if window.is_alike && self.held[at].is_in_contact() {
-            let dt = if at > 0 { self.held[at].stamp_ns - self.held[at - 1].stamp_ns } else { 0 };
+            let dt = if at > 0 { self.held[at].stamp_ns.saturating_sub(self.held[at - 1].stamp_ns) } else { 0 };
             let normal = match &mut self.friction {
                 Some(friction) => {
                     friction.observe(&sliding, dt as f64 * 1e-9);
@@ -307,14 +308,14 @@ impl Window {
             self.first -= 1;
             self.add(&held[self.first], &held[at]);
         }
-        while self.last + 1 < held.len() && held[self.last + 1].stamp_ns - middle <= half_ns {
+        while self.last + 1 < held.len() && held[self.last + 1].stamp_ns.saturating_sub(middle) <= half_ns {
             self.last += 1;
             self.add(&held[self.last], &held[at]);
         }
     }
 
     fn add(&mut self, entry: &WindowEntry, middle: &WindowEntry) {
-        self.sums.add((entry.stamp_ns - middle.stamp_ns) as f64 * 1e-9, &entry.centre);
+        self.sums.add(entry.stamp_ns.saturating_sub(middle.stamp_ns) as f64 * 1e-9, &entry.centre);
         self.force += entry.force_o;
         self.is_alike &= entry.is_in_contact() == middle.is_in_contact();
     }

@@ -154,10 +154,10 @@ impl MarkerFilter {
 
     /// The body flown on to the frame and pulled by its markers; `None` when too little has held it for too long.
     fn follow(&mut self, before: &Tracked, frame: &MarkerFrame) -> Option<Tracked> {
-        if frame.stamp_ns - before.held_ns > self.params.coast_ns {
+        if frame.stamp_ns.saturating_sub(before.held_ns) > self.params.coast_ns {
             return None;
         }
-        let dt = (frame.stamp_ns - before.stamp_ns) as f64 * 1e-9;
+        let dt = frame.stamp_ns.saturating_sub(before.stamp_ns) as f64 * 1e-9;
         let mut motion = before.motion.fly(dt);
         let matches = self.body.matched(&motion.pose_ot(&self.body), frame.seen(), self.params.gate);
         self.counts.relabelled += matches.relabelled;
@@ -165,7 +165,7 @@ impl MarkerFilter {
         let is_held = self.body.is_held_by(matches.pairs());
         // what has gone astray since the speed was last corrected is not taken for the speed of the last moment
         let since_ns = if is_held { before.held_ns } else { before.stamp_ns };
-        let since = (frame.stamp_ns - since_ns) as f64 * 1e-9;
+        let since = frame.stamp_ns.saturating_sub(since_ns) as f64 * 1e-9;
         motion.pull(&self.body, matches.pairs(), &self.params.spring, self.params.noise, since);
         let held_ns = if is_held { frame.stamp_ns } else { before.held_ns };
         Some(Tracked { stamp_ns: frame.stamp_ns, held_ns, motion })
@@ -175,12 +175,13 @@ impl MarkerFilter {
     fn give(&self, before: &Tracked, now: &Tracked, each: &mut impl FnMut(StampedPose)) {
         let period = self.params.period_ns;
         let [from, to] = [before, now].map(|tracked| tracked.motion.pose_ot(&self.body));
-        let span = (now.stamp_ns - before.stamp_ns) as f64;
+        let span = now.stamp_ns.saturating_sub(before.stamp_ns) as f64;
         let mut stamp_ns = (before.stamp_ns.div_euclid(period) + 1).saturating_mul(period);
         while stamp_ns <= now.stamp_ns {
-            let pose_ot = interpolated(&from, &to, (stamp_ns - before.stamp_ns) as f64 / span);
+            let pose_ot = interpolated(&from, &to, stamp_ns.saturating_sub(before.stamp_ns) as f64 / span);
             each(StampedPose { stamp_ns, pose_ot });
-            stamp_ns = stamp_ns.saturating_add(period);
+            let Some(next) = stamp_ns.checked_add(period) else { break };
+            stamp_ns = next;
         }
     }
 }

@@ -1,0 +1,20 @@
+//! A folder of rosbag2: its metadata beside a file that is whole.
+
+#![no_main]
+
+use std::fs;
+
+use libfuzzer_sys::fuzz_target;
+use touchup_fuzz::seeds::mcap_bytes;
+use touchup_fuzz::{place, read_all};
+use touchup_io::recording::Topics;
+
+fuzz_target!(|data: &[u8]| {
+    let folder = place("bag");
+    if !folder.is_dir() {
+        fs::create_dir(&folder).expect("the folder for temporary files takes a folder");
+        fs::write(folder.join("bag_0.mcap"), mcap_bytes()).expect("it takes a file");
+    }
+    fs::write(folder.join("metadata.yaml"), data).expect("it takes a file");
+    read_all(&folder, &Topics::default());
+});

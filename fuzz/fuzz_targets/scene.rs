@@ -1,0 +1,23 @@
+//! A scene: what is accepted makes settings that the rooms take or refuse by name.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use touchup_core::haptic::Refiner;
+use touchup_core::reconstruct::Patcher;
+use touchup_core::stylus::{Synchroniser, WrenchFrame};
+use touchup_fuzz::closed_box;
+use touchup_session::scene::Scene;
+
+fuzz_target!(|yaml: &str| {
+    let Ok(scene) = Scene::from_yaml(yaml) else { return };
+    let _ = Synchroniser::new(scene.sync_params());
+    let _ = scene.marker_filter();
+    let _ = scene.probing();
+    let _ = scene.placement().map(|placement| placement.check());
+    let _ = scene.input_monitor_params(WrenchFrame::Sensor);
+    let _ = scene.patcher_params().map(Patcher::new);
+    if let Some(params) = scene.refine_params(WrenchFrame::Sensor) {
+        let _ = Refiner::new(closed_box([0.01; 3], 1), params);
+    }
+});
