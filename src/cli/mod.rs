@@ -36,6 +36,7 @@ mod simulate;
 mod simulated_world;
 mod step;
 mod threads;
+mod told;
 #[cfg(feature = "ur")]
 mod ur;
 

@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
 use super::signals::{SignalKind, on_each_signal};
+use super::told::{ToldBy, ToldNumbers};
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
 use crate::io::mesh_file::{MeshFile, read_mesh};
@@ -46,6 +47,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let ready = Prepared::new(config.parameters.clone())?;
     let (scan, faces) = ready.scan();
     print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
+    print_result(&arguments.told(&config, &ready).to_string())?;
     print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
@@ -86,6 +88,15 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 }
 
 impl NodeArguments {
+    /// What the mesh will depend on, and who told it.
+    fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
+        let is_set = config.parameters.double("tip_radius_mm") > 0.0;
+        let radius_by = self.tip_radius_mm.map(|_| ToldBy::Flag).or(is_set.then_some(ToldBy::Parameter));
+        // without a scene the defaults are nobody's word
+        let yaml = if config.parameters.string("scene").is_empty() { "" } else { ready.scene_yaml() };
+        ToldNumbers::of(ready.scene(), yaml, [radius_by, None, None])
+    }
+
     /// The flag overrides files of parameters, which may name a scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
         let Some(scene) = &self.scene else { return Ok(()) };

@@ -15,6 +15,7 @@ use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
+use super::told::{ToldBy, ToldNumbers};
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
@@ -154,35 +155,6 @@ reported! {
         /// how well that is known; not there where `uncertainty` is off
         uncertainty?: UncertaintySummary = outcome.uncertainty,
     }
-}
-
-/// A number that the result depends on.
-#[derive(Clone, Debug, Serialize)]
-struct ToldNumber {
-    value: f64,
-    source: ToldBy,
-}
-
-touchup_core::names! {
-    /// Where a number comes from.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-    #[serde(rename_all = "snake_case")]
-    pub enum ToldBy {
-        /// a flag
-        Flag = "flag",
-        /// the scene
-        Scene = "scene",
-        /// nobody: that of a usual cell
-        Default = "default",
-    }
-}
-
-/// What was told of tip and scan; of a rigid tip no stiffness.
-#[derive(Clone, Debug, Serialize)]
-struct ToldNumbers {
-    tip_radius_mm: ToldNumber,
-    stiffness_n_per_mm: Option<ToldNumber>,
-    scan_noise_mm: ToldNumber,
 }
 
 /// Coefficient of kinetic friction and its standard error.
@@ -454,13 +426,7 @@ impl RefineArguments {
             Some(path) => Scene::read_with_text(path)?,
             None => (Scene::default(), String::new()),
         };
-        let told_by = |flag: Option<f64>, section: &str, key: &str| match flag {
-            Some(_) => ToldBy::Flag,
-            None if Scene::names(&yaml, section, key) => ToldBy::Scene,
-            None => ToldBy::Default,
-        };
         scene.tell_radius(&yaml, self.tip_radius_mm)?;
-        let radius_by = told_by(self.tip_radius_mm, "tip", "radius_mm");
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }
@@ -472,30 +438,9 @@ impl RefineArguments {
         }
         // the file was in range when it was read: what is not now came by a flag
         scene.validate().map_err(CliError::usage)?;
-        let stiffness_by = told_by(self.stiffness_n_per_mm, "tip", "stiffness_n_per_mm");
-        let noise_by = told_by(self.scan_noise_mm, "scan", "noise_mm");
-        let tip = scene.tip_params();
-        let told = ToldNumbers {
-            tip_radius_mm: ToldNumber { value: tip.radius * 1e3, source: radius_by },
-            stiffness_n_per_mm: tip.stiffness.map(|k| ToldNumber { value: k / 1e3, source: stiffness_by }),
-            scan_noise_mm: ToldNumber {
-                value: scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise) * 1e3,
-                source: noise_by,
-            },
-        };
+        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
+        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
         Ok((scene, told))
-    }
-}
-
-impl fmt::Display for ToldNumbers {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { tip_radius_mm: radius, stiffness_n_per_mm: stiffness, scan_noise_mm: noise } = self;
-        write!(f, "tip: radius {:.4} mm ({}), ", radius.value, radius.source)?;
-        match stiffness {
-            Some(stiffness) => write!(f, "stiffness {:.4} N/mm ({})", stiffness.value, stiffness.source)?,
-            None => write!(f, "rigid")?,
-        }
-        write!(f, "; scan: noise {:.3} mm ({})", noise.value, noise.source)
     }
 }
 

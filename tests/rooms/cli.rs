@@ -360,14 +360,14 @@ fn a_scene_that_names_no_radius_has_told_none() {
     fs::write(path("untold.yaml"), "tip: { stiffness_n_per_mm: 20 }\nscan: { file: scan.ply }\nrobot:\n").unwrap();
     let (scene, out) = (path("untold.yaml"), path("out"));
     let probe = ["probe", "--robot", "sim", "--scene", &scene, "--feature", "hole@0,0,0", "--out", &out, "--dry-run"];
-    let sessions = format!("session_folder:={out}");
-    let node = ["node", "--scene", &scene, "--ros-args", "-p", &sessions];
     let asked = [
         case.refine_untold("touch.mcap", "out.ply", &["--scene", &scene]),
         touchup(&["doctor", &path("scan.ply"), &path("touch.mcap"), "--scene", &scene], ""),
         touchup(&["doctor", &path("scan.ply"), &path("touch.mcap")], ""),
         touchup(&probe, ""),
-        touchup(&node, ""),
+        #[cfg(any(feature = "ros", feature = "r2r"))]
+        touchup(&["node", "--scene", &scene, "--ros-args", "-p", &format!("session_folder:={out}")], ""),
+        #[cfg(any(feature = "ros", feature = "r2r"))]
         touchup(&["node", "--ros-args", "-p", &format!("scan:={}", path("scan.ply"))], ""),
     ];
     for output in asked {
@@ -378,6 +378,43 @@ fn a_scene_that_names_no_radius_has_told_none() {
     assert!(!case.path("out").exists() && !case.path("out.ply").exists());
     let told = ["doctor", &path("scan.ply"), &path("touch.mcap"), "--scene", &scene, "--tip-radius-mm", "1.5"];
     assert_eq!(code(&touchup(&told, "")), 0);
+}
+
+/// What a node prints before it is on the network.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+#[test]
+fn a_node_says_what_was_told_of_tip_and_scan_and_by_what() {
+    use std::io::{BufRead, BufReader};
+    let case = Case::new();
+    let path = |name: &str| case.path(name).to_str().unwrap().to_owned();
+    let (scene, sessions) = (path("cell.yaml"), format!("session_folder:={}", path("sessions")));
+    fs::write(&scene, "tip: { radius_mm: 1.4, stiffness_n_per_mm: 25 }\nscan: { file: scan.ply }\n").unwrap();
+    let scan = format!("scan:={}", path("scan.ply"));
+    let told = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut node = command.args(arguments).stdout(Stdio::piped()).spawn().unwrap();
+        let lines = BufReader::new(node.stdout.take().unwrap()).lines();
+        let line = lines.map(Result::unwrap).find(|line| line.starts_with("tip: "));
+        node.kill().unwrap();
+        node.wait().unwrap();
+        line.unwrap()
+    };
+    assert_eq!(
+        told(&["node", "--scene", &scene, "--ros-args", "-p", &sessions]),
+        "tip: radius 1.4000 mm (scene), stiffness 25.0000 N/mm (scene); scan: noise 0.600 mm (default)"
+    );
+    assert_eq!(
+        told(&["node", "--scene", &scene, "--tip-radius-mm", "1.25", "--ros-args", "-p", &sessions]),
+        "tip: radius 1.2500 mm (flag), stiffness 25.0000 N/mm (scene); scan: noise 0.600 mm (default)"
+    );
+    // a session keeps the radius that was told
+    let newest = fs::read_dir(case.path("sessions")).unwrap().map(|entry| entry.unwrap().path()).max().unwrap();
+    let kept = touchup::scene::Scene::read(&newest.join("scene.yaml")).unwrap();
+    assert_eq!(kept.tip_params().radius, 1.25e-3);
+    assert_eq!(
+        told(&["node", "--ros-args", "-p", &sessions, "-p", &scan, "-p", "tip_radius_mm:=1.5"]),
+        "tip: radius 1.5000 mm (parameter), stiffness 20.0000 N/mm (default); scan: noise 0.600 mm (default)"
+    );
 }
 
 #[test]

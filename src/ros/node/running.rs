@@ -80,6 +80,11 @@ impl Prepared {
         &self.setup.scene
     }
 
+    /// … and its text.
+    pub fn scene_yaml(&self) -> &str {
+        &self.setup.scene_yaml
+    }
+
     /// What was built of the scene, and the memory that it took.
     ///
     /// - `has_arm`: whether an arm probes.

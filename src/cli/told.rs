@@ -1,0 +1,69 @@
+//! The numbers of tip and scan that a result depends on, and who told them.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::scene::Scene;
+
+/// A number that the result depends on.
+#[derive(Clone, Debug, Serialize)]
+struct ToldNumber {
+    value: f64,
+    source: ToldBy,
+}
+
+touchup_core::names! {
+    /// Where a number comes from.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum ToldBy {
+        /// a flag
+        Flag = "flag",
+        /// a parameter of the node
+        Parameter = "parameter",
+        /// the scene
+        Scene = "scene",
+        /// nobody: that of a usual cell
+        Default = "default",
+    }
+}
+
+/// What was told of tip and scan; of a rigid tip no stiffness.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ToldNumbers {
+    tip_radius_mm: ToldNumber,
+    stiffness_n_per_mm: Option<ToldNumber>,
+    scan_noise_mm: ToldNumber,
+}
+
+impl ToldNumbers {
+    /// - `yaml`: text of the scene; empty for none.
+    /// - `others`: who told radius, stiffness and noise over the scene.
+    pub fn of(scene: &Scene, yaml: &str, others: [Option<ToldBy>; 3]) -> Self {
+        let [by_radius, by_stiffness, by_noise] = others;
+        let told = |value: f64, other: Option<ToldBy>, section: &str, key: &str| {
+            let by_scene = if Scene::names(yaml, section, key) { ToldBy::Scene } else { ToldBy::Default };
+            ToldNumber { value, source: other.unwrap_or(by_scene) }
+        };
+        let tip = scene.tip_params();
+        let noise = scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise);
+        Self {
+            tip_radius_mm: told(tip.radius * 1e3, by_radius, "tip", "radius_mm"),
+            stiffness_n_per_mm: tip.stiffness.map(|k| told(k / 1e3, by_stiffness, "tip", "stiffness_n_per_mm")),
+            scan_noise_mm: told(noise * 1e3, by_noise, "scan", "noise_mm"),
+        }
+    }
+}
+
+impl fmt::Display for ToldNumbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { tip_radius_mm: radius, stiffness_n_per_mm: stiffness, scan_noise_mm: noise } = self;
+        write!(f, "tip: radius {:.4} mm ({}), ", radius.value, radius.source)?;
+        match stiffness {
+            Some(stiffness) => write!(f, "stiffness {:.4} N/mm ({})", stiffness.value, stiffness.source)?,
+            None => write!(f, "rigid")?,
+        }
+        write!(f, "; scan: noise {:.3} mm ({})", noise.value, noise.source)
+    }
+}
