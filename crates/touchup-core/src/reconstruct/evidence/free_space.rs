@@ -71,6 +71,11 @@ impl FreeSpace {
         Self { reach, centres: VoxelSet::new(cell), body, changed: Vec::new() }
     }
 
+    /// Whether the tip is a ball.
+    pub fn is_of_ball(&self) -> bool {
+        self.body.is_none()
+    }
+
     /// Takes a place of the tip.
     pub fn add_place(&mut self, place: &TipPlace) {
         let centre = &place.centre;

@@ -241,9 +241,10 @@ impl Evidence<'_> {
     }
 
     /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge there, or sank into a hole.
-    fn end_at_free_space(&self, found: &mut FieldValue, x: &Point3<f64>) {
+    pub(in crate::reconstruct) fn end_at_free_space(&self, found: &mut FieldValue, x: &Point3<f64>) {
         let radius = self.params.radius;
-        if found.lateral() < ENDS_FROM * radius {
+        // a tip of another shape reaches along its flank, and the nearest place of it says little of its surface
+        if found.lateral() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
             return;
         }
         let Some((distance, centre)) = self.free_space.nearest(x) else { return };

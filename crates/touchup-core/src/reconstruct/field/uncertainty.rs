@@ -43,13 +43,15 @@ const SCATTER: f64 = 0.33;
 /// How much a plane may turn beyond its last contact, rad: 3°.
 const TURN: f64 = 0.053;
 /// Where contacts that face otherwise are near, a surface turns before the next contact by this share of the angle between …
-const TURN_SHARE: f64 = 0.6;
+const TURN_SHARE: f64 = 0.45;
 /// … or of this, where the edge that they make is known.
-const TURN_SHARE_AT_EDGE: f64 = 0.35;
+const TURN_SHARE_AT_EDGE: f64 = 0.06;
+/// By this much normals differ on a plane by noise and friction alone, rad: 11°.
+const TURN_NOISE: f64 = 0.2;
 /// A surface turns by what faces otherwise up to so many σ behind the nearest contact.
 const TURN_REACH: f64 = 2.0;
 /// Where two surfaces meet the ball touches both, and the fit is off by up to this share of σ …
-const MEETING: f64 = 0.25;
+const MEETING: f64 = 0.15;
 /// … when the other is as near as the one; by less and less up to this many σ.
 const MEETING_REACH: f64 = 1.2;
 /// Both surfaces of an edge count where they are as near as each other, by less and less up to this many σ.
@@ -110,7 +112,8 @@ impl FieldParams {
         }
     }
 
-    /// Root mean square angle between the field at `x` and the contacts around the nearest one, of whichever piece, rad.
+    /// Root mean square angle between the field at `x` and the contacts around the nearest one, of whichever piece, beyond what noise makes of it,
+    /// rad.
     fn turn_around(&self, found: &FieldValue, store: &ContactMap, x: &Point3<f64>, near: &[Member]) -> f64 {
         let reach_squared = (found.nearest + TURN_REACH * self.sigma).powi(2);
         let (mut sum, mut count) = (0.0, 0.0f64);
@@ -118,11 +121,12 @@ impl FieldParams {
             let mean = &store.means()[member.index as usize];
             if (mean.point - x).norm_squared() <= reach_squared {
                 // 2 (1 − cos α) is α², for small ones
-                sum += 2.0 * (1.0 - mean.normal.dot(&found.gradient));
+                let noise = store.sums(member.index).sigma().normal;
+                sum += 2.0 * (1.0 - mean.normal.dot(&found.gradient)) - noise * noise;
                 count += 1.0;
             }
         }
-        (sum / count.max(1.0)).max(0.0).sqrt()
+        (sum / count.max(1.0) - TURN_NOISE * TURN_NOISE).max(0.0).sqrt()
     }
 }
 
@@ -165,14 +169,17 @@ pub(in crate::reconstruct) fn vertex_sigma(
         return scan;
     }
     let (field, radius) = (&evidence.params.field, evidence.params.radius);
-    let Some(found) = field.at(evidence.contacts, p, scratch) else {
+    let Some(mut found) = field.at(evidence.contacts, p, scratch) else {
         let from_scan = evidence.scan_at(p).map_or(0.0, |scan| (scan.foot - p).norm());
         return scan.hypot(guess(field.reach.max(from_scan), radius));
     };
     let fit = field.sigma_of(&found, evidence.contacts, p, window_ns, scratch).total();
     match support {
         Support::Guessed => fit.hypot(guess(found.nearest, radius)),
-        _ => fit.hypot(OFF_FIT * found.value),
+        _ => {
+            evidence.end_at_free_space(&mut found, p);
+            fit.hypot(OFF_FIT * found.value)
+        }
     }
 }
 
