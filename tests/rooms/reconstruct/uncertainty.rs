@@ -91,7 +91,7 @@ impl Normalised {
 #[test]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
-    let seeds = either(2, 20);
+    let seeds = either(6, 20);
     let noisy = SensorParams { pose_noise: 0.2e-3, orientation_noise: 0.3f64.to_radians(), ..SensorParams::default() };
     let styli = [
         ("usual", StylusParams::default(), 0.93),
@@ -123,8 +123,7 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
             guessed.within(1.96)
         );
         assert!((0.8..=1.25).contains(&touched.rms()), "{name}: {}", touched.rms());
-        // as far above as below
-        assert!((least..=2.0 * 0.95 - least).contains(&two), "{name}: {two}");
+        assert!((least..=0.97).contains(&two), "{name}: {two}");
     }
 }
 

@@ -138,7 +138,6 @@ pub(super) fn number<S: Surface>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)]
 /// Distance of a place from a plane, m.
 fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
     let value = (end.point - plane.surface.point()).dot(&plane.surface.normal()).abs();
-    // what is alike in both is in no distance of them
-    let std = plane.own_std_at(&end.point).map(|std| std.hypot(end.sigma));
+    let std = plane.std_at(&end.point).map(|std| std.hypot(end.sigma));
     Measured { value, std, touches: touches.clone(), ..Measured::default() }
 }

@@ -45,8 +45,8 @@ const SHORT: f64 = 0.35;
 const BESIDE: f64 = 0.15;
 /// A touch is of the edge at an end of a wall when it is nearer to it than this, in radii of the ball …
 const OVER_END: f64 = 0.3;
-/// … and its normal leans towards it by more than this, rad: 8°.
-const OVER_END_LEAN: f64 = 0.14;
+/// … and its normal leans towards it by more than this, rad: 15°.
+const OVER_END_LEAN: f64 = 0.26;
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 

@@ -63,11 +63,8 @@ pub struct Coverage {
     pub failed: Vec<String>,
 }
 
-/// The root mean square of error over stated standard deviation of numbers of features is to be within these.
+/// The root mean square of error over stated standard deviation is to be within these.
 pub const HONEST: [f64; 2] = [0.8, 1.25];
-
-/// Of vertices a share is to be within 1.96 standard deviations; these are too wide where the root mean square is below this.
-const TOO_WIDE: f64 = 0.5;
 
 impl KindInWorld {
     fn scores(&self) -> impl Iterator<Item = f64> {
@@ -103,10 +100,8 @@ impl KindInWorld {
     /// Whether the statements hold as well as is demanded; `None` where there is none.
     pub fn holds(&self) -> Option<bool> {
         let rms = self.rms_score()?;
-        Some(match self.kind.least_within() {
-            Some(least) => self.share_within() >= Some(least) && rms >= TOO_WIDE,
-            None => (HONEST[0]..=HONEST[1]).contains(&rms),
-        })
+        let is_enough = self.kind.least_within().is_none_or(|least| self.share_within() >= Some(least));
+        Some((HONEST[0]..=HONEST[1]).contains(&rms) && is_enough)
     }
 }
 

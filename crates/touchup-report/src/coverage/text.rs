@@ -30,9 +30,8 @@ impl Coverage {
             "A plate with two holes, a slot, a boss and a step, scanned and touched in the simulated worlds {}, seeds {} to {} of each. \
              A world draws tip, bending, clocks, tare, friction, sensors, scan and hand; the program is told what a calibration leaves, \
              and that uncertainty with it. Seed by seed the hand goes around in the holes, into none, half around, and a third of the way. \
-             Error over stated standard deviation has a root mean square of 1 where the statement holds; 0.8 to 1.25 is demanded of \
-             features, and of vertices that 93 % are within 1.96 standard deviations, at edges and rims 90 %, and that these are not \
-             twice too wide. The root mean square of n numbers is itself known to 1/√(2n).",
+             Error over stated standard deviation has a root mean square of 1 where the statement holds; 0.8 to 1.25 is demanded, and \
+             93 % of the vertices within 1.96 standard deviations, at edges and rims 90 %. The root mean square of n numbers is itself known to 1/√(2n).",
             worlds.join(", "),
             self.params.seeds.start(),
             self.params.seeds.end(),

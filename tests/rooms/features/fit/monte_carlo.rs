@@ -190,6 +190,25 @@ fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
     }
 }
 
+/// What two planes share is in the place of each and not in what they differ by.
+#[test]
+fn a_common_displacement_of_a_plane_is_beside_its_own_uncertainty() {
+    let mut rng = generator(13);
+    let at = |i: usize| Point3::new((i % 20) as f64 * 0.1, (i / 20) as f64 * 0.1, 0.0);
+    let exact: Vec<_> =
+        (0..400).map(|i| Observation { point: at(i), offset: 0.0, sigma: 0.01, group: i as u32 }).collect();
+    let touched = noisy(&exact, &mut rng, 0.0, 0.01);
+    let guess = Plane::new(Point3::new(0.0, 0.0, 0.1), &Vector3::z());
+    let of = |shift_sigma| fit(&guess, &touched, &FitParams { shift_sigma, ..FitParams::default() }).unwrap();
+    let (without, with) = (of(0.0), of(0.02));
+    let [own, all] = [&without, &with].map(|fit| fit.std(Freedom::Z).unwrap());
+    // 400 places of 10 µm each
+    assert!((own / 0.5e-3 - 1.0).abs() < 0.2, "{own}");
+    assert!((all - own.hypot(0.02)).abs() < 1e-9, "{all} {own}");
+    assert_eq!(with.std(Freedom::TiltX), without.std(Freedom::TiltX));
+    assert!((with.own_covariance - without.covariance).amax() < 1e-18);
+}
+
 #[test]
 fn a_common_error_goes_into_the_radius_and_not_into_the_axis() {
     let mut rng = generator(7);

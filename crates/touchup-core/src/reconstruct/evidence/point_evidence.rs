@@ -346,3 +346,43 @@ impl Evidence<'_> {
         (depth, is_free)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::reconstruct::{ContactSigma, SurfaceContact};
+    use crate::stylus::{TipBody, TipPlace, TipShape};
+
+    /// The face z = 0 is touched up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r beyond, the face is 0.26 r deep in it.
+    #[test]
+    fn a_face_ends_where_the_ball_rolled_around_its_edge() {
+        let radius = 1.5e-3;
+        let free_space = || FreeSpace::new(TipBody::new(TipShape::Ball, radius).unwrap(), 0.05 * radius, 2.0 * radius);
+        let (mut contacts, mut rolled) = (ContactMap::new(radius / 3.0, 2.0 * radius, None), free_space());
+        let along = || (-12..=12).map(|i| f64::from(i) * 0.25e-3);
+        for (x, j) in along().flat_map(|x| (0..=16).map(move |j| (x, f64::from(j)))) {
+            let (point, normal, sigma) = (Point3::new(x, -j * 0.25e-3, 0.0), Vector3::z(), ContactSigma::default());
+            contacts.add(&SurfaceContact { point, normal, weight: 5.0, stamp_ns: 0, sigma });
+        }
+        for (x, angle) in along().flat_map(|x| (0..=60).map(move |degrees| (x, f64::from(degrees).to_radians()))) {
+            let centre = Point3::new(x, radius * angle.sin(), radius * angle.cos());
+            rolled.add_place(&TipPlace { centre, axis: Vector3::z() });
+        }
+        let corners = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let scan = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
+        let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(radius, 0.3e-3));
+        let nowhere = free_space();
+        let value = |free_space: &FreeSpace, y: f64| {
+            let (contacts, scan, tree, params) = (&contacts, &scan, &tree, &params);
+            let evidence = Evidence { params, contacts, free_space, scan, tree, prior: None, is_closed: false };
+            evidence.touched(&Point3::new(0.0, y, 0.0), None, &mut FieldScratch::default()).unwrap().value
+        };
+        assert!(value(&nowhere, 0.5 * radius).abs() < 1e-9, "it would go straight on");
+        // deepest below the ball at an angle of 60°: r − |(0.5 − sin 60°, cos 60°)| r, less the margin of 0.05 r
+        let depth = radius * (1.0 - (0.5 - 0.75f64.sqrt()).hypot(0.5) - 0.05);
+        assert!((value(&rolled, 0.5 * radius) - depth).abs() < 0.02 * radius, "{}", value(&rolled, 0.5 * radius));
+        assert!(value(&rolled, -radius).abs() < 1e-9, "what was touched stays");
+    }
+}
