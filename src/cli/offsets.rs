@@ -5,9 +5,9 @@ use std::fmt;
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use super::{counted, reported};
+use super::reported;
 use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
-use crate::stylus::{ClockOffset, ContactSample, SettingError};
+use crate::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError};
 
 reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
@@ -17,19 +17,18 @@ reported! {
         wrench_offset_ms: f64 = found.offset * 1e3 + applied_ns as f64 * 1e-6,
         /// standard uncertainty
         sigma_ms: f64 = found.sigma * 1e3,
-        /// number of contact onsets used
-        onsets: usize = found.onsets,
+        /// what it is estimated from
+        evidence: ClockEvidence = found.evidence,
     }
 }
 
 impl fmt::Display for WrenchOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { wrench_offset_ms, sigma_ms, onsets } = *self;
-        let onsets = counted(onsets, "onset", "onsets");
+        let Self { wrench_offset_ms, sigma_ms, evidence } = *self;
         write!(
             f,
-            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {onsets} of \
-             contact (sync.wrench_offset_ms; not applied)"
+            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {evidence} \
+             (sync.wrench_offset_ms; not applied)"
         )
     }
 }

@@ -17,10 +17,11 @@ use touchup_report::coverage::CoverageParams;
 use touchup_report::document::Report;
 use touchup_report::error::MeasureError;
 use touchup_report::files::ReportError;
+use touchup_report::mistakes::MistakesParams;
 use touchup_report::whole_scan::GivenPart;
 use touchup_report::work_precision::WorkPrecision;
 use touchup_report::{
-    Chapter, Effort, TableCell, convergence, cost, coverage, extremes, stability, verdict, whole_scan,
+    Chapter, Effort, TableCell, convergence, cost, coverage, extremes, mistakes, stability, verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scene::{Scene, SceneError};
@@ -97,7 +98,7 @@ pub struct ReportArguments {
     /// Tip, sensor and frames of the recording
     #[arg(long, value_name = "YAML", requires = "scan")]
     scene: Option<PathBuf>,
-    /// Seeds of the worlds of the coverage chapter, first and last [default: 1-20, with --quick 1-1]
+    /// Seeds of the worlds of the coverage and mistakes chapters, first and last [default: 1-20, with --quick 1-1]
     #[arg(long, value_name = "A-B")]
     seeds: Option<Seeds>,
     /// Only these chapters
@@ -136,6 +137,8 @@ enum ReportChapter {
     Cost,
     /// Errors of vertices and features over their stated uncertainties, in simulated worlds
     Coverage,
+    /// What is said of wrong input, and of sound, in simulated worlds
+    Mistakes,
 }
 
 /// Measures the selected chapters, writes the report, and prints the verdict.
@@ -224,6 +227,12 @@ impl ReportArguments {
             params.seeds = self.seeds.as_ref().map_or(params.seeds, |seeds| seeds.0.clone());
             let measured = coverage::coverage(params, progress);
             add(measured.chapter(), verdict::of_coverage(&measured));
+        }
+        if is_wanted(ReportChapter::Mistakes) {
+            let mut params = MistakesParams::of(effort);
+            params.seeds = self.seeds.as_ref().map_or(params.seeds, |seeds| seeds.0.clone());
+            let measured = mistakes::mistakes(params, progress);
+            add(measured.chapter(), verdict::of_mistakes(&measured));
         }
         if let Some(measured) = peers {
             add(measured.chapter(), verdict::of_peers(&measured));

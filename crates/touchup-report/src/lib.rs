@@ -14,6 +14,7 @@ pub mod error;
 pub mod extremes;
 mod figure;
 pub mod files;
+pub mod mistakes;
 mod number;
 mod page;
 pub mod peers;

@@ -6,6 +6,7 @@ use super::cost::Cost;
 use super::coverage::Coverage;
 use super::extremes::Extremes;
 use super::figure::{Table, TableCell};
+use super::mistakes::{LEAST_NAMED, Mistakes};
 use super::number::three_digits;
 use super::peers::{Peers, PeersAtSize};
 use super::stability::{Integrator, Stability};
@@ -146,6 +147,21 @@ pub fn of_coverage(measured: &Coverage) -> Vec<String> {
     text += &if outside.is_empty() { ".".to_owned() } else { format!("; OUTSIDE: {}.", outside.join("; ")) };
     text += &format!(" Lower bounds that the truth contradicts: {contradicted}.");
     vec![text]
+}
+
+/// Whether wrong input is named, and sound input is left alone.
+pub fn of_mistakes(measured: &Mistakes) -> Vec<String> {
+    let [made, sound] = measured.counts();
+    let is_enough = made.right as f64 >= LEAST_NAMED * made.all as f64;
+    vec![format!(
+        "Mistakes: the cause of {} of {} wrong recordings is named, {} the {:.0} % demanded; {} alarms on {} sound ones.",
+        made.right,
+        made.all,
+        if is_enough { "within" } else { "OUTSIDE" },
+        100.0 * LEAST_NAMED,
+        sound.all - sound.right,
+        sound.all,
+    )]
 }
 
 /// Which step to take, and where even that fails.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::names;
 
 names! {
-    /// What would explain the recording.
+    /// What would explain the recording, in the order in which it is to be mended: each may be what the later ones come of.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum InputCause {
@@ -19,34 +19,36 @@ names! {
         StampsGoBack = "stamps_go_back",
         /// Poses too far apart in time to interpolate between them.
         SlowPoses = "slow_poses",
-        /// The wrench is stamped later or earlier than the pose of the same instant.
-        Delay = "delay",
         /// No sample came of the messages.
         NoSample = "no_sample",
         /// No force that stands out of the noise.
         NoContact = "no_contact",
+        /// Forces in another unit.
+        ForceUnit = "force_unit",
         /// Poses, scan or radius in another unit of length.
         LengthUnit = "length_unit",
         /// Axes of the positions are swapped or mirrored.
         PositionAxes = "position_axes",
-        /// The contacts are not on the scan.
-        Frame = "frame",
-        /// The ball's centre is another distance off the surface than its radius.
-        Radius = "radius",
+        /// The components of the orientation are in another order.
+        QuaternionOrder = "quaternion_order",
         /// The wrench is what the stylus does to the part.
         WrenchSign = "wrench_sign",
         /// The wrench is in other axes than those it was read in.
         WrenchFrame = "wrench_frame",
-        /// The components of the orientation are in another order.
-        QuaternionOrder = "quaternion_order",
-        /// A force that is there while nothing is touched.
-        Tare = "tare",
-        /// Forces in another unit.
-        ForceUnit = "force_unit",
-        /// Contacts whose force is below the threshold of contact.
-        LightTouch = "light_touch",
+        /// The wrench is stamped later or earlier than the pose of the same instant.
+        Delay = "delay",
+        /// The contacts are not on the scan.
+        Frame = "frame",
+        /// The ball's centre is another distance off the surface than its radius.
+        Radius = "radius",
+        /// The stylus bends more, or less, than its stiffness says.
+        Stiffness = "stiffness",
         /// Forces clipped at one value.
         Saturation = "saturation",
+        /// Contacts whose force is below the threshold of contact.
+        LightTouch = "light_touch",
+        /// A force that is there while nothing is touched.
+        Tare = "tare",
     }
 }
 

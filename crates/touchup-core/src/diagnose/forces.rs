@@ -10,7 +10,7 @@ const REST_CANDIDATES: usize = 64;
 /// Share of all samples that lie around the rest at least.
 const REST_SHARE: f64 = 0.05;
 /// A force this many noises off the rest is one.
-const NOISES: f64 = 8.0;
+pub(super) const NOISES: f64 = 8.0;
 /// … and this share of the largest.
 const SHARE_OF_LARGEST: f64 = 0.25;
 
@@ -51,7 +51,8 @@ impl ForceLevels {
         Self { rest_t: Vector3::zeros(), largest: quantile(&sizes, 0.95), ..self }
     }
 
-    fn off_rest(&self, record: &InputRecord) -> f64 {
+    /// |F − rest|, N.
+    pub fn off_rest(&self, record: &InputRecord) -> f64 {
         (record.force_t() - self.rest_t).norm()
     }
 
@@ -75,4 +76,13 @@ pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f6
             })
         })
     })
+}
+
+/// Axes as a wrench or a position is taken in: (x, −z, y).
+pub(super) fn axes_in_words(axes: &nalgebra::Matrix3<f64>) -> String {
+    let name = |row: usize| {
+        let column = (0..3).find(|&column| axes[(row, column)] != 0.0).unwrap_or(0);
+        format!("{}{}", if axes[(row, column)] < 0.0 { "−" } else { "" }, ["x", "y", "z"][column])
+    };
+    format!("({}, {}, {})", name(0), name(1), name(2))
 }

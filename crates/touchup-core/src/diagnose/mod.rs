@@ -7,8 +7,11 @@
 mod finding;
 mod forces;
 mod input_record;
+mod judge;
+mod mends;
 mod monitor;
 mod places;
+mod shift;
 mod stamps;
 
 pub use finding::{InputCause, InputFinding};

@@ -1,6 +1,6 @@
 //! Where the ball is against the scan.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
@@ -81,16 +81,19 @@ pub(super) struct BallFit {
     pub distance: f64,
     /// median deviation from that, m
     pub scatter: f64,
-    /// share within the tolerance
+    /// share within the tolerance, of those that are not below the surface: there the scan has a lid over a hole
     pub share: f64,
     /// of each centre, m
-    distances: Vec<f64>,
+    pub distances: Vec<f64>,
     /// outward normal under each centre
     pub normals: Vec<Vector3<f64>>,
 }
 
 /// Touches that follow each other share the same error of the scan: so many count as one.
-const ALIKE: f64 = 10.0;
+pub(super) const ALIKE: f64 = 10.0;
+
+/// No more than this share of the contacts is under lids of the scan.
+const MOST_UNDER_LIDS: f64 = 0.6;
 
 impl BallFit {
     /// Standard uncertainty of the median distance of `count` centres, m.
@@ -114,10 +117,12 @@ impl BallFit {
             distances.push(off.norm().copysign(off.dot(&normal)));
             normals.push(normal);
         }
-        let residuals: Vec<f64> = distances.iter().map(|distance| (distance - radius).abs()).collect();
-        let within = residuals.iter().filter(|&&residual| residual <= tolerance).count();
-        let share = within as f64 / residuals.len().max(1) as f64;
-        let distance = median(&mut distances).unwrap_or(f64::INFINITY);
+        let within = distances.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
+        let below = distances.iter().filter(|&&distance| distance < -tolerance).count();
+        let is_lid = below as f64 <= MOST_UNDER_LIDS * distances.len() as f64;
+        let count = distances.len() - if is_lid { below } else { 0 };
+        let share = within as f64 / count.max(1) as f64;
+        let distance = median(&mut distances.clone()).unwrap_or(f64::INFINITY);
         let mut scatters: Vec<f64> = distances.iter().map(|x| (x - distance).abs()).collect();
         let scatter = median(&mut scatters).unwrap_or(f64::INFINITY);
         Self { distance, scatter, share, distances, normals }
@@ -128,51 +133,4 @@ impl BallFit {
     pub fn share_beyond(&self, distance: f64) -> f64 {
         self.distances.iter().filter(|x| x.abs() > distance).count() as f64 / self.distances.len().max(1) as f64
     }
-}
-
-/// What may have happened to all positions, and what brings them back.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PlaceMistake {
-    /// of the positions
-    pub undo: Matrix3<f64>,
-    /// of the radius, in the unit of the scan as it was read
-    pub radius_factor: f64,
-    pub says: &'static str,
-    pub is_unit: bool,
-}
-
-/// Factors of length that a file or a driver is wrong by, and axes that are swapped.
-pub(super) fn place_mistakes() -> Vec<PlaceMistake> {
-    const UNITS: [(f64, f64, &str); 10] = [
-        (1e-3, 1.0, "the poses look like mm, and are read as m"),
-        (1e3, 1.0, "the poses look like km, and are read as m"),
-        (25.4e-3, 1.0, "the poses look like inches, and are read as m"),
-        (1e-2, 1.0, "the poses look like cm, and are read as m"),
-        (25.4, 25.4, "the scan looks like mm, and is read as inches"),
-        (1e3, 1e3, "the scan looks like mm, and is read as m"),
-        (1e-3, 1e-3, "the scan looks like m, and is read as mm"),
-        (1.0 / 25.4, 1.0 / 25.4, "the scan looks like inches, and is read as mm"),
-        (25.4e-3, 25.4e-3, "the scan looks like m, and is read as inches"),
-        (1e3 / 25.4, 1e3 / 25.4, "the scan looks like inches, and is read as m"),
-    ];
-    const SWAPPED: [([usize; 3], &str); 5] = [
-        ([1, 0, 2], "the positions fit with x and y swapped"),
-        ([0, 2, 1], "the positions fit with y and z swapped"),
-        ([2, 1, 0], "the positions fit with x and z swapped"),
-        ([1, 2, 0], "the positions fit with the axes in the order y, z, x"),
-        ([2, 0, 1], "the positions fit with the axes in the order z, x, y"),
-    ];
-    let units = UNITS.into_iter().map(|(scale, radius_factor, says)| PlaceMistake {
-        undo: Matrix3::identity() * scale,
-        radius_factor,
-        says,
-        is_unit: true,
-    });
-    let swapped = SWAPPED.into_iter().map(|(order, says)| PlaceMistake {
-        undo: Matrix3::from_fn(|row, column| f64::from(u8::from(order[row] == column))),
-        radius_factor: 1.0,
-        says,
-        is_unit: false,
-    });
-    units.chain(swapped).collect()
 }

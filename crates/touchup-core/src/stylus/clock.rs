@@ -4,13 +4,16 @@
 //! centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force rises as A (1 − e^(−(t − t₁)/T)). The
 //! delay is δ = t₁ − t₀. Within ± 120 ms, the δ is searched at which the ball loses most speed along the force, on the mean
 //! of all onsets; around that, each onset gives the profile of its least squares over δ. All of them together give δ, and
-//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as strong, nothing is said.
+//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as strong, they say nothing. The course of
+//! motion and force between the onsets ([`CourseClock`]) speaks where they do not, and against them where they are wrong.
 
 use std::collections::VecDeque;
+use std::fmt;
 
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
+use super::course_clock::CourseClock;
 use super::{ContactSample, SettingError};
 use crate::numeric::{NormalEquations, direction, median};
 
@@ -21,8 +24,34 @@ pub struct ClockOffset {
     pub offset: f64,
     /// standard uncertainty, s
     pub sigma: f64,
-    /// onsets of contact that it is estimated from
-    pub onsets: usize,
+    /// what it is estimated from
+    pub evidence: ClockEvidence,
+}
+
+/// What a delay is estimated from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClockEvidence {
+    /// So many onsets of contact.
+    Onsets(usize),
+    /// The course of motion and force over so many seconds of sliding or lifting.
+    Course(f64),
+}
+
+impl fmt::Display for ClockEvidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Onsets(onsets) => write!(f, "{onsets} onsets of contact"),
+            Self::Course(seconds) => write!(f, "{seconds:.0} s of sliding and lifting"),
+        }
+    }
+}
+
+impl ClockOffset {
+    /// Whether another estimate differs by no more than the uncertainties and `slack`, s.
+    pub(super) fn agrees(&self, other: &Self, slack: f64) -> bool {
+        (self.offset - other.offset).abs() <= slack + 3.0 * self.sigma.hypot(other.sigma)
+    }
 }
 
 /// Of a stop, on each side of it, s.
@@ -62,6 +91,8 @@ const LEAST_ONSETS: usize = 8;
 /// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
 /// the wrench is added: over which part of it a sensor takes its mean is unknown.
 const SHAPE: f64 = 0.3e-3;
+/// Beyond their uncertainties, the delays by onsets and by the course differ by less than this, s.
+const AGREED: f64 = 4e-3;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 3e-3;
 
@@ -77,6 +108,7 @@ pub struct ClockEstimator {
     /// between two samples, at the last onset, s
     period: f64,
     onsets: VecDeque<Onset>,
+    course: CourseClock,
 }
 
 /// The samples around the instant at which the gate opens, and when the force begins, s after that.
@@ -106,11 +138,13 @@ impl ClockEstimator {
         SettingError::check("tip stiffness (N/m)", value, value > 0.0, "more than 0")?;
         let held = VecDeque::with_capacity(MOST_SAMPLES);
         let onsets = VecDeque::new();
-        Ok(Self { stiffness, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets })
+        let course = CourseClock::default();
+        Ok(Self { stiffness, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets, course })
     }
 
     /// Takes the next sample, which is later than the one before.
     pub fn push(&mut self, sample: &ContactSample) {
+        self.course.push(sample);
         let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
         let was_in_contact = std::mem::replace(&mut self.is_in_contact, is_in_contact);
         if self.held.len() == MOST_SAMPLES {
@@ -137,8 +171,17 @@ impl ClockEstimator {
         }
     }
 
-    /// The delay of all onsets so far; `None` when they do not determine it.
+    /// The delay by all onsets so far; where they do not determine it, or the course of motion and force contradicts them, by that; `None`
+    /// when neither does.
     pub fn offset(&self) -> Option<ClockOffset> {
+        let (onsets, course) = (self.by_onsets(), self.course.offset());
+        match (onsets, course) {
+            (Some(onsets), Some(course)) if !onsets.agrees(&course, AGREED) => Some(course),
+            (onsets, course) => onsets.or(course),
+        }
+    }
+
+    fn by_onsets(&self) -> Option<ClockOffset> {
         if self.onsets.len() < LEAST_ONSETS {
             return None;
         }
@@ -166,7 +209,7 @@ impl ClockEstimator {
         let scatter: f64 = profiles.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
         let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
         let offset = coarse + (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, onsets: profiles.len() })
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, evidence: ClockEvidence::Onsets(profiles.len()) })
     }
 
     /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it stops at two of them.

@@ -12,6 +12,7 @@ mod clock;
 mod compensate;
 mod contact;
 mod contact_estimator;
+mod course_clock;
 mod force_noise;
 mod free_motion;
 mod friction;
@@ -26,7 +27,7 @@ mod tip_motion;
 mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
-pub use clock::{ClockEstimator, ClockOffset};
+pub use clock::{ClockEstimator, ClockEvidence, ClockOffset};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};

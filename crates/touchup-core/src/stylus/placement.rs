@@ -39,14 +39,20 @@ impl Placement {
         }
     }
 
-    fn pose(&self, mut pose: StampedPose) -> StampedPose {
-        if let Some(offset) = self.p_ht {
-            pose.pose_ot *= Translation3::from(offset);
-        }
-        if let Some(pose_wo) = &self.pose_wo {
-            pose.pose_ot = pose_wo.inv_mul(&pose.pose_ot);
-        }
-        pose
+    fn pose(&self, pose: StampedPose) -> StampedPose {
+        StampedPose { pose_ot: self.placed(&pose.pose_ot), ..pose }
+    }
+
+    /// pose_OT of a recorded pose_WH.
+    pub(crate) fn placed(&self, pose_wh: &Isometry3<f64>) -> Isometry3<f64> {
+        let pose_wt = self.p_ht.map_or(*pose_wh, |offset| pose_wh * Translation3::from(offset));
+        self.pose_wo.map_or(pose_wt, |pose_wo| pose_wo.inv_mul(&pose_wt))
+    }
+
+    /// The recorded pose_WH of a pose_OT.
+    pub(crate) fn unplaced(&self, pose_ot: &Isometry3<f64>) -> Isometry3<f64> {
+        let pose_wt = self.pose_wo.map_or(*pose_ot, |pose_wo| pose_wo * pose_ot);
+        self.p_ht.map_or(pose_wt, |offset| pose_wt * Translation3::from(-offset))
     }
 
     fn wrench(&self, wrench: StampedWrench) -> StampedWrench {

@@ -90,7 +90,8 @@ impl Scene {
             tip: self.tip_params(),
             shape: self.tip_shape(),
             scan_noise: self.scan_noise(),
-            contact_on: has_gate.then(|| self.contact.unwrap_or_default().on),
+            placement: self.placement().unwrap_or_default(),
+            gate: has_gate.then(|| self.contact.unwrap_or_default()),
             sync: self.sync_params(),
         }
     }

@@ -1,0 +1,92 @@
+//! What may have happened to all poses, or to the unit of the scan, and what brings it back.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion};
+
+use super::finding::InputCause;
+use super::forces::{axes_in_words, signed_permutations};
+use super::input_record::InputRecord;
+use crate::stylus::Placement;
+
+/// A mistake, undone.
+#[derive(Clone, Debug)]
+pub(super) struct PlaceMend {
+    /// what it mends
+    pub cause: InputCause,
+    /// in words
+    pub says: String,
+    /// of the recorded positions, in the frame that they were recorded in
+    poses: Matrix3<f64>,
+    /// the recorded orientation was read with w behind
+    is_w_first: bool,
+    /// what is read as 1 m of the scan is so many
+    pub scan_unit: f64,
+}
+
+impl PlaceMend {
+    /// Where the ball is then, in the scan as it was read.
+    pub fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
+        self.pose(placement, record).translation.vector.scale(self.scan_unit).into()
+    }
+
+    /// How the ball is turned then.
+    pub fn rotation(&self, placement: &Placement, record: &InputRecord) -> UnitQuaternion<f64> {
+        self.pose(placement, record).rotation
+    }
+
+    fn pose(&self, placement: &Placement, record: &InputRecord) -> Isometry3<f64> {
+        let recorded = placement.unplaced(&Isometry3::from_parts(record.centre.into(), record.rotation));
+        let rotation = if self.is_w_first { w_first(&recorded.rotation) } else { recorded.rotation };
+        let position = self.poses * recorded.translation.vector;
+        placement.placed(&Isometry3::from_parts(position.into(), rotation))
+    }
+
+    /// w first in the quaternion.
+    pub fn w_first() -> Self {
+        Self {
+            cause: InputCause::QuaternionOrder,
+            says: "the poses fit with w first in the quaternion".to_owned(),
+            poses: Matrix3::identity(),
+            is_w_first: true,
+            scan_unit: 1.0,
+        }
+    }
+
+    /// Factors of length that a file or a driver is wrong by.
+    pub fn units() -> impl Iterator<Item = Self> {
+        const UNITS: [(f64, f64, &str); 10] = [
+            (1e-3, 1.0, "the poses look like mm, and are read as m"),
+            (1e3, 1.0, "the poses look like km, and are read as m"),
+            (25.4e-3, 1.0, "the poses look like inches, and are read as m"),
+            (1e-2, 1.0, "the poses look like cm, and are read as m"),
+            (1.0, 25.4, "the scan looks like mm, and is read as inches"),
+            (1.0, 1e3, "the scan looks like mm, and is read as m"),
+            (1.0, 1e-3, "the scan looks like m, and is read as mm"),
+            (1.0, 1.0 / 25.4, "the scan looks like inches, and is read as mm"),
+            (1.0, 25.4e-3, "the scan looks like m, and is read as inches"),
+            (1.0, 1e3 / 25.4, "the scan looks like inches, and is read as m"),
+        ];
+        UNITS.into_iter().map(|(poses, scan_unit, says)| Self {
+            cause: InputCause::LengthUnit,
+            says: says.to_owned(),
+            poses: Matrix3::identity() * poses,
+            is_w_first: false,
+            scan_unit,
+        })
+    }
+
+    /// Axes of the positions, swapped and mirrored.
+    pub fn axes() -> impl Iterator<Item = Self> {
+        signed_permutations().skip(1).map(|poses| Self {
+            cause: InputCause::PositionAxes,
+            says: format!("the positions fit with their axes taken as {}", axes_in_words(&poses)),
+            poses,
+            is_w_first: false,
+            scan_unit: 1.0,
+        })
+    }
+}
+
+/// The orientation that was meant where w stands in front of x, y and z.
+fn w_first(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(read.i, read.j, read.k, read.w))
+}

@@ -1,0 +1,70 @@
+//! Whether the contacts lie on the scan when all of them are shifted.
+
+use nalgebra::{Point3, Vector3};
+
+use super::places::BallFit;
+use crate::mesh::{FaceTree, TriMesh, VertexId};
+
+/// Contacts, and vertices of the scan, that are brought together.
+const CONTACTS: usize = 24;
+const VERTICES: usize = 48;
+/// Contacts that a shift is judged by first.
+const JUDGES: usize = 60;
+/// Best shifts that are refined.
+const REFINED: usize = 8;
+/// Steps of the refinement: from so many tolerances on, each half of the one before.
+const FIRST_STEP: f64 = 4.0;
+const STEPS: usize = 6;
+
+/// A shift of all contacts, and how they lie then.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContactShift {
+    /// m
+    pub shift: Vector3<f64>,
+    /// share of the contacts on the scan
+    pub share: f64,
+}
+
+/// The shift with which most contacts are on the scan: each of some contacts is laid on each of some vertices, and the best are refined.
+pub(super) fn best_shift(
+    scan: &TriMesh,
+    tree: &FaceTree,
+    centres: &[Point3<f64>],
+    radius: f64,
+    tolerance: f64,
+) -> Option<ContactShift> {
+    let some = |most: usize| centres.iter().step_by(centres.len().div_ceil(most).max(1));
+    let judges: Vec<Point3<f64>> = some(JUDGES).copied().collect();
+    let share = |of: &[Point3<f64>], shift: Vector3<f64>| {
+        BallFit::of(scan, tree, of.iter().map(|centre| centre + shift), radius, tolerance).share
+    };
+    let vertices = (0..scan.vertex_slots()).step_by((scan.vertex_slots() / VERTICES).max(1));
+    let vertices = vertices.map(|at| VertexId(at as u32)).filter(|&vertex| scan.has_vertex(vertex));
+    let mut shifts: Vec<ContactShift> = vertices
+        .filter_map(|vertex| {
+            let normals = scan.star(vertex).iter().map(|&face| scan.double_area_normal(face)).sum::<Vector3<f64>>();
+            Some(scan.position(vertex) + normals.try_normalize(0.0)? * radius)
+        })
+        .flat_map(|place| some(CONTACTS).map(move |centre| place - centre))
+        .map(|shift| ContactShift { shift, share: share(&judges, shift) })
+        .collect();
+    shifts.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let refined = shifts.into_iter().take(REFINED).map(|mut best| {
+        best.share = share(centres, best.shift);
+        let mut step = FIRST_STEP * tolerance;
+        for _ in 0..STEPS {
+            for axis in 0..3 {
+                for sign in [-1.0, 1.0] {
+                    let shift = best.shift + Vector3::ith(axis, sign * step);
+                    let share = share(centres, shift);
+                    if share > best.share {
+                        best = ContactShift { shift, share };
+                    }
+                }
+            }
+            step /= 2.0;
+        }
+        best
+    });
+    refined.max_by(|a, b| a.share.total_cmp(&b.share))
+}

@@ -1,0 +1,261 @@
+//! How late the clock of the wrench reads, from the whole course of motion and force.
+//!
+//! **Sliding**: friction turns with the motion. A ball that slides is held back by the force along its way, F · v̂ = −|F| sin φ, with the
+//! angle of friction φ. Where the stylus turns back, and where it rolls around an edge, F and v turn at one instant. Read with a delay δ,
+//! the cosine s = F(t + δ) · v(t) / |F| |v| leaves its level there: over all sliding, its variance is least at the delay.
+//!
+//! **Lifting**: where there is a gap between ball and part there is no force (Signorini's condition, F ≥ 0, g ≥ 0, F g = 0). Read with a
+//! delay, the force is still there when the ball has left, and there before it comes: the mean of F(t + δ) g(t) is least at the delay. The gap is
+//! measured from where the ball was lowest along the force shortly before and after.
+
+use std::collections::VecDeque;
+
+use nalgebra::Vector3;
+
+use super::{ClockEvidence, ClockOffset, ContactSample};
+
+/// Delays that are tried: ± [`REACH`] steps of [`STEP_NS`].
+const STEP_NS: i64 = 4_000_000;
+const REACH: usize = 37;
+const DELAYS: usize = 2 * REACH + 1;
+/// The longest of them.
+const SPAN_NS: i64 = REACH as i64 * STEP_NS;
+/// A velocity is the difference of two means over this long, on both sides of its instant.
+const MEAN_NS: i64 = 35_000_000;
+/// Slower, the ball does not slide for sure, m/s.
+const LEAST_SPEED: f64 = 8e-3;
+/// Samples farther apart do not belong together, ns.
+const LONGEST_GAP_NS: i64 = 100_000_000;
+/// Samples that are held: 300 ms at 4 kHz.
+const MOST_SAMPLES: usize = 1536;
+/// One instant in this time is enough, ns.
+const EVERY_NS: i64 = 4_000_000;
+/// Instants of a block: 0.4 s.
+const BLOCK: usize = 100;
+/// Blocks that are kept; then two become one.
+const MOST_BLOCKS: usize = 64;
+/// Fewer do not determine their spread.
+const LEAST_BLOCKS: usize = 8;
+/// What is least at the delay is this share at most of its mean over all delays: else nothing turned, or lifted.
+const LEAST_SHARE: f64 = 0.7;
+/// A wider uncertainty is no estimate, s.
+const LARGEST_SIGMA: f64 = 12e-3;
+/// Beyond their uncertainties, two estimates differ by less than this, s.
+const AGREED: f64 = 4e-3;
+
+/// One number for each delay.
+type OfDelays = [f64; DELAYS];
+
+/// Sums over some instants, for each delay.
+#[derive(Clone, Copy, Debug)]
+struct DelayBlock {
+    count: usize,
+    sums: OfDelays,
+    squares: OfDelays,
+}
+
+impl DelayBlock {
+    const EMPTY: Self = Self { count: 0, sums: [0.0; DELAYS], squares: [0.0; DELAYS] };
+
+    fn joined(mut self, other: &Self) -> Self {
+        self.count += other.count;
+        for at in 0..DELAYS {
+            self.sums[at] += other.sums[at];
+            self.squares[at] += other.squares[at];
+        }
+        self
+    }
+
+    /// Sum of squares about the mean, at each delay.
+    fn scatter(&self) -> OfDelays {
+        std::array::from_fn(|at| self.squares[at] - self.sums[at] * self.sums[at] / self.count.max(1) as f64)
+    }
+}
+
+/// Blocks of instants, bounded.
+#[derive(Clone, Debug)]
+struct DelayBlocks {
+    /// instants that make one
+    size: usize,
+    block: DelayBlock,
+    blocks: Vec<DelayBlock>,
+}
+
+impl DelayBlocks {
+    fn add(&mut self, values: &OfDelays) {
+        for (at, value) in values.iter().enumerate() {
+            self.block.sums[at] += value;
+            self.block.squares[at] += value * value;
+        }
+        self.block.count += 1;
+        if self.block.count == self.size {
+            self.blocks.push(std::mem::replace(&mut self.block, DelayBlock::EMPTY));
+            if self.blocks.len() == MOST_BLOCKS {
+                self.blocks = self.blocks.chunks_exact(2).map(|two| two[0].joined(&two[1])).collect();
+                self.size *= 2;
+            }
+        }
+    }
+
+    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the blocks.
+    ///
+    /// - `period`: between two samples, s.
+    fn offset(&self, period: f64, of_block: impl Fn(&DelayBlock) -> OfDelays) -> Option<ClockOffset> {
+        if self.blocks.len() < LEAST_BLOCKS {
+            return None;
+        }
+        let parts: Vec<OfDelays> = self.blocks.iter().map(of_block).collect();
+        let total: OfDelays = std::array::from_fn(|at| parts.iter().map(|part| part[at]).sum());
+        let offset = least(&total)?;
+        let mean = total.iter().sum::<f64>() / DELAYS as f64;
+        if total.iter().copied().fold(f64::INFINITY, f64::min) > LEAST_SHARE * mean {
+            return None;
+        }
+        let without = |part: &OfDelays| least(&std::array::from_fn(|at| total[at] - part[at]));
+        let without: Vec<f64> = parts.iter().map(without).collect::<Option<_>>()?;
+        let count = without.len() as f64;
+        let middle = without.iter().sum::<f64>() / count;
+        let variance = (count - 1.0) / count * without.iter().map(|x| (x - middle).powi(2)).sum::<f64>();
+        let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
+        let instants: usize = self.blocks.iter().map(|block| block.count).sum();
+        // of the force nearest to a delay, and of the mean that a sensor takes over a period
+        let sigma = variance.sqrt().hypot(step / 2.0).hypot(period / 2.0);
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, evidence: ClockEvidence::Course(instants as f64 * every) })
+    }
+}
+
+impl Default for DelayBlocks {
+    fn default() -> Self {
+        Self { size: BLOCK, block: DelayBlock::EMPTY, blocks: Vec::new() }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct CourseSample {
+    stamp_ns: i64,
+    position: Vector3<f64>,
+    force_o: Vector3<f64>,
+    is_in_contact: bool,
+}
+
+/// Collects what slides and lifts. Memory is bounded.
+#[derive(Clone, Debug)]
+pub(super) struct CourseClock {
+    held: VecDeque<CourseSample>,
+    next_ns: i64,
+    sliding: DelayBlocks,
+    lifting: DelayBlocks,
+}
+
+impl Default for CourseClock {
+    fn default() -> Self {
+        let held = VecDeque::with_capacity(MOST_SAMPLES);
+        Self { held, next_ns: i64::MIN, sliding: DelayBlocks::default(), lifting: DelayBlocks::default() }
+    }
+}
+
+impl CourseClock {
+    /// Takes the next sample, which is later than the one before.
+    pub fn push(&mut self, sample: &ContactSample) {
+        let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
+        let is_next = |last: &CourseSample| tip.stamp_ns.saturating_sub(last.stamp_ns) <= LONGEST_GAP_NS;
+        if !self.held.back().is_none_or(is_next) {
+            self.held.clear();
+        }
+        if self.held.len() == MOST_SAMPLES {
+            self.held.pop_front();
+        }
+        let (stamp_ns, position) = (tip.stamp_ns, tip.pose_ot.translation.vector);
+        self.held.push_back(CourseSample { stamp_ns, position, force_o: tip.force_o, is_in_contact });
+        let oldest_ns = stamp_ns.saturating_sub(2 * SPAN_NS);
+        // one before that stays: it shows that the course is as long
+        while self.held.get(1).is_some_and(|second| second.stamp_ns <= oldest_ns) {
+            self.held.pop_front();
+        }
+        let is_covered = self.held.front().is_some_and(|first| first.stamp_ns <= oldest_ns);
+        if is_covered && stamp_ns >= self.next_ns {
+            self.next_ns = stamp_ns.saturating_add(EVERY_NS);
+            self.add(stamp_ns - SPAN_NS);
+        }
+    }
+
+    /// Compares the motion at `middle_ns` with the forces around it.
+    fn add(&mut self, middle_ns: i64) {
+        let presses = self.held.iter().filter(|x| x.is_in_contact).count();
+        if presses == self.held.len() {
+            if let Some(values) = self.cosines(middle_ns) {
+                self.sliding.add(&values);
+            }
+        } else if presses > 0
+            && let Some(values) = self.forces_at_gap(middle_ns)
+        {
+            self.lifting.add(&values);
+        }
+    }
+
+    /// F(t + δ) · v(t) / |F| |v|.
+    fn cosines(&self, middle_ns: i64) -> Option<OfDelays> {
+        let before = self.mean_position(middle_ns - MEAN_NS, middle_ns)?;
+        let way = self.mean_position(middle_ns, middle_ns + MEAN_NS)? - before;
+        let length = way.norm();
+        (length >= LEAST_SPEED * MEAN_NS as f64 * 1e-9)
+            .then(|| self.at_delays(middle_ns, |force_o| force_o.dot(&way) / (force_o.norm() * length)))
+    }
+
+    /// F(t + δ) g(t), N m.
+    fn forces_at_gap(&self, middle_ns: i64) -> Option<OfDelays> {
+        let along = self.held.iter().map(|x| x.force_o).sum::<Vector3<f64>>().try_normalize(0.0)?;
+        let middle = self.mean_position(middle_ns - EVERY_NS, middle_ns + EVERY_NS)?;
+        let lowest = self.held.iter().map(|x| (x.position - middle).dot(&along)).fold(0.0, f64::min);
+        Some(self.at_delays(middle_ns, |force_o| -lowest * force_o.dot(&along)))
+    }
+
+    fn mean_position(&self, from_ns: i64, to_ns: i64) -> Option<Vector3<f64>> {
+        let first = self.held.partition_point(|x| x.stamp_ns < from_ns);
+        let end = self.held.partition_point(|x| x.stamp_ns <= to_ns).max(first + 1);
+        (end <= self.held.len())
+            .then(|| self.held.range(first..end).map(|x| x.position).sum::<Vector3<f64>>() / (end - first) as f64)
+    }
+
+    /// `value` of the force nearest to each delay.
+    fn at_delays(&self, middle_ns: i64, value: impl Fn(&Vector3<f64>) -> f64) -> OfDelays {
+        let mut nearest = 0;
+        std::array::from_fn(|at| {
+            let wanted_ns = middle_ns + (at as i64 - REACH as i64) * STEP_NS;
+            let distance = |x: &CourseSample| (x.stamp_ns - wanted_ns).abs();
+            while self.held.get(nearest + 1).is_some_and(|next| distance(next) <= distance(&self.held[nearest])) {
+                nearest += 1;
+            }
+            value(&self.held[nearest].force_o)
+        })
+    }
+
+    /// Between the samples that are held, s.
+    fn period(&self) -> f64 {
+        let ends = self.held.front().zip(self.held.back());
+        let span = ends.map_or(0.0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns) as f64 * 1e-9);
+        span / (self.held.len().max(2) - 1) as f64
+    }
+
+    /// The delay; `None` where neither sliding nor lifting determines it, or the two differ.
+    pub fn offset(&self) -> Option<ClockOffset> {
+        let period = self.period();
+        let lifting = self.lifting.offset(period, |block| block.sums);
+        match (self.sliding.offset(period, DelayBlock::scatter), lifting) {
+            (Some(sliding), Some(lifting)) => {
+                let surer = if sliding.sigma <= lifting.sigma { sliding } else { lifting };
+                sliding.agrees(&lifting, AGREED).then_some(surer)
+            }
+            (sliding, lifting) => sliding.or(lifting),
+        }
+    }
+}
+
+/// Where a sum is least, by the parabola through the three points around it, s; `None` at an end.
+fn least(sums: &OfDelays) -> Option<f64> {
+    let at = (0..DELAYS).min_by(|&a, &b| sums[a].total_cmp(&sums[b]))?;
+    let (before, after) = (sums.get(at.checked_sub(1)?)?, sums.get(at + 1)?);
+    let bend = before - 2.0 * sums[at] + after;
+    let shift = if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+    Some((at as f64 - REACH as f64 + shift) * STEP_NS as f64 * 1e-9)
+}

@@ -1,0 +1,117 @@
+//! What is said of wrong input: recordings of named worlds, sound and with one mistake each, through the checks of `touchup doctor`.
+//!
+//! A world draws its truth from a seed, and the program is told what a calibration leaves of it ([`SimWorld`]): its scene is what
+//! `touchup simulate --world` writes.
+
+mod case;
+mod text;
+
+use std::ops::RangeInclusive;
+
+use super::Effort;
+use touchup_core::diagnose::InputFinding;
+use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
+
+/// What is run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MistakesParams {
+    /// in this order
+    pub worlds: Vec<SimWorld>,
+    /// of each world, with each mistake
+    pub seeds: RangeInclusive<u64>,
+    /// so many times as many seeds after those are looked at without a mistake alone
+    pub more_sound: u64,
+    /// longest time of the rasters over the part, s
+    pub longest: f64,
+}
+
+impl MistakesParams {
+    /// One seed of two worlds, or twenty of all and forty more without a mistake.
+    pub fn of(effort: Effort) -> Self {
+        Self {
+            worlds: SimWorld::ALL[..effort.choose(5, SimWorld::ALL.len())].to_vec(),
+            seeds: 1..=effort.choose(1, 20),
+            more_sound: effort.choose(0, 2),
+            longest: effort.choose(20.0, 60.0),
+        }
+    }
+}
+
+/// What was said of one recording.
+#[derive(Clone, Debug)]
+pub struct CheckedRecording {
+    /// whose it is
+    pub world: SimWorld,
+    /// of the world
+    pub seed: u64,
+    /// `None`: it is sound
+    pub mistake: Option<&'static InputMistake>,
+    /// the surest first
+    pub findings: Vec<InputFinding>,
+}
+
+impl CheckedRecording {
+    /// Whether the mistake is what is said first, and surely; of a sound recording, that nothing is said.
+    pub fn is_right(&self) -> bool {
+        match (self.mistake, self.findings.first()) {
+            (None, first) => first.is_none(),
+            (Some(mistake), first) => first.is_some_and(|first| first.is_sure && first.cause == mistake.cause),
+        }
+    }
+
+    /// What is said first; empty for nothing.
+    pub fn said(&self) -> String {
+        self.findings.first().map_or_else(String::new, |first| format!("{}: {first}", first.cause))
+    }
+}
+
+/// All recordings, with what was said of them.
+#[derive(Clone, Debug)]
+pub struct Mistakes {
+    /// what was run
+    pub params: MistakesParams,
+    /// by world and seed, the sound one first
+    pub checked: Vec<CheckedRecording>,
+    /// a recording that could not be made, in words
+    pub failed: Vec<String>,
+}
+
+/// How many of some recordings were judged rightly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RightCount {
+    /// judged rightly
+    pub right: usize,
+    /// of all
+    pub all: usize,
+}
+
+impl RightCount {
+    /// Of these.
+    pub fn of<'a>(checked: impl Iterator<Item = &'a CheckedRecording>) -> Self {
+        checked.fold(Self::default(), |count, checked| Self {
+            right: count.right + usize::from(checked.is_right()),
+            all: count.all + 1,
+        })
+    }
+}
+
+/// The share of mistakes whose cause is to be named.
+pub const LEAST_NAMED: f64 = 0.95;
+
+/// Checks each seed of each world, without a mistake and with each.
+pub fn mistakes(params: MistakesParams, progress: &mut dyn FnMut(&str)) -> Mistakes {
+    let (mut checked, mut failed) = (Vec::new(), Vec::new());
+    let (first, last) = (*params.seeds.start(), *params.seeds.end());
+    let more = params.more_sound.saturating_mul(last - first + 1);
+    for &world in &params.worlds {
+        for seed in first..=last.saturating_add(more) {
+            progress(&format!("mistakes: {}, seed {seed}", world.name()));
+            let made = if params.seeds.contains(&seed) { INPUT_MISTAKES } else { &[] };
+            match case::run(world, seed, params.longest, made) {
+                Ok(of_seed) => checked.extend(of_seed),
+                Err(error) => failed.push(format!("{}, seed {seed}: {error}", world.name())),
+            }
+        }
+    }
+    Mistakes { params, checked, failed }
+}
