@@ -129,7 +129,8 @@ impl Probing<'_> {
                 self.flags.len(),
                 self.out.join(TOUCHES).display()
             ));
-            return Ok(Done { summary: ProbingSummary { check, features, refine: None }, probed, outcome: Err(error) });
+            let summary = ProbingSummary { check, features, told: ready.told.clone(), refine: None };
+            return Ok(Done { summary, probed, outcome: Err(error) });
         }
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let bag = self.out.join(RECORDING);
@@ -148,7 +149,8 @@ impl Probing<'_> {
         };
         let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
         draw_touches(&mesh, &folder.touches()?, &probed, self.flags, &self.out.join("touches.png"))?;
-        Ok(Done { summary: ProbingSummary { check, features, refine: Some(refine) }, probed, outcome })
+        let summary = ProbingSummary { check, features, told: ready.told.clone(), refine: Some(refine) };
+        Ok(Done { summary, probed, outcome })
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use nalgebra::Point3;
-use serde_json::Value;
+use serde_json::{Value, json};
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use touchup::sim::{ArmErrorSigmas, ArmErrors, Plate, Surface};
 
@@ -153,8 +153,13 @@ fn a_dry_run_draws_the_plan_and_moves_nothing() {
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let text = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(text.lines().next().unwrap().ends_with("planned touches can be made; nothing moved"), "{text}");
+    let told = "\ntip: radius 1.5000 mm (scene), stiffness 15.0000 N/mm (scene); scan: noise 0.600 mm (default)\n";
+    assert!(text.contains(told), "{text}");
     let done = probe(folder.path(), forbid, &[&hole[..], &["--json"]].concat());
     let plan: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let number = |value: f64, source: &str| json!({ "value": value, "source": source });
+    assert_eq!(plan["told"]["tip_radius_mm"], number(1.5, "scene"));
+    assert_eq!(plan["told"]["scan_noise_mm"], number(0.6, "default"));
     let [feature] = plan["features"].as_array().unwrap().as_slice() else { panic!("{plan}") };
     let planned = format!("feature 1: {} touches planned", feature["touches"]);
     assert!(feature["touches"].as_u64().unwrap() > 0 && text.contains(&planned), "{plan} {text}");
