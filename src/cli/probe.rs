@@ -55,6 +55,9 @@ pub(super) struct ProbeArguments {
     /// Goes on with a probing that was broken off in the folder of --out: what is finished there is not probed again
     #[arg(long, conflicts_with = "dry_run")]
     resume: bool,
+    /// Writes mesh and features also where something of what the arm measured is surely wrong (`touchup doctor`)
+    #[arg(long, conflicts_with = "dry_run")]
+    force: bool,
     /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json, refined.ply, features.json, touches.csv,
     /// touches.png
     #[arg(long, value_name = "DIR")]
@@ -74,6 +77,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
         unit,
         flags: &flags,
         is_simulated: *robot == RobotName::Sim,
+        is_forced: arguments.force,
         out: &arguments.out,
     };
     let mut ready = probing.ready()?;

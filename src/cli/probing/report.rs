@@ -158,7 +158,7 @@ pub(in crate::cli) struct ProbingSummary {
     pub features: Vec<ProbedRecord>,
     /// what was told of tip and scan, and by what
     pub told: ToldNumbers,
-    /// of the mesh; not there where a signal ended the probing
+    /// of the mesh; not there where a signal ended the probing, and where the mesh was not written
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<RefineSummary>,
 }
