@@ -17,7 +17,7 @@ use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
-use crate::diagnose::{InputCause, InputFinding, InputMonitor};
+use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
@@ -84,7 +84,7 @@ pub(super) struct RefineArguments {
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
-    /// The touches are on what the scan may lack, as a hole that it closed: that they are off it is then a doubt and not sure
+    /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is then a doubt and not sure
     #[arg(skip)]
     pub touches_flaws: bool,
     /// Strokes that were taken back or done again in the session
@@ -363,8 +363,8 @@ impl RefineArguments {
     ) -> Result<Vec<InputFinding>, CliError> {
         let mut findings = monitor.findings(scan, tree);
         if self.touches_flaws {
-            let frame = findings.iter_mut().filter(|finding| finding.cause == InputCause::Frame);
-            frame.for_each(|finding| finding.is_sure = false);
+            let off_the_scan = findings.iter_mut().filter(|finding| finding.cause.is_read_off_the_scan());
+            off_the_scan.for_each(|finding| finding.is_sure = false);
             findings.sort_by_key(|finding| !finding.is_sure);
         }
         if !self.force {

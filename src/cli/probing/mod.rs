@@ -157,7 +157,7 @@ impl Probing<'_> {
                 Err(CliError::ended(ending).with(losses.join("; ")))
             }
             (_, Some(failed)) => Err(failed.with(format_args!(
-                "no mesh is written, the touches ({touches}) are in {}; --resume --force writes one",
+                "the touches ({touches}) are in {}; --resume --force makes the mesh of them",
                 self.out.join(TOUCHES).display()
             ))),
             (_, None) => Ok(losses),

@@ -248,6 +248,21 @@ fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     assert_eq!((done.status.code(), are_there()), (Some(0), [true; 4]), "{}", stderr(&done));
 }
 
+/// The scan has closed the slot: four of five contacts are off it, and with y and z swapped more of them would be on it. That is what an arm is sent
+/// for, and no mistake.
+#[test]
+fn what_the_scan_has_lost_is_probed_without_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let slot = ["--feature", "slot@26.1,13.1,12", "--tolerance-mm", "0.2", "--json"];
+    let done = probe(folder.path(), |scene| scene, &slot);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let findings = summary["refine"]["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|finding| finding["cause"] == "position_axes"), "{summary}");
+    assert!(findings.iter().all(|finding| finding["is_sure"] == false), "{summary}");
+    assert!(folder.path().join("out/refined.ply").exists());
+}
+
 /// A tolerance below what a touch can be known by, and too few touches for a hole.
 #[test]
 fn what_is_not_as_asked_is_named_with_its_reason_and_exit_code() {
