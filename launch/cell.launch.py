@@ -1,11 +1,11 @@
 """A cell: the node, the frames of its scene, and RViz where it is installed.
 
-    ros2 launch touchup cell.launch.py scan:=part.ply
+    ros2 launch touchup cell.launch.py scan:=part.ply tip_radius_mm:=1.5
     ros2 launch touchup cell.launch.py scan:=part.ply robot:=ur ur_type:=ur5e source:=probe scene:=cell.yaml
 
 The hand stylus, or the arm of somebody else with the probe, publishes wrench and pose; with robot:=sim or robot:=ur the
-node does. Everything runs in `namespace`. Who touches, who moves and the scene come from here, as the frames depend on them;
-other parameters come from the file `params` unless they are given here.
+node does. Everything runs in `namespace`. Who touches, who moves, the scene and the radius of the ball come from here, as the frames depend
+on them; the scene or `tip_radius_mm` tells the radius. Other parameters come from the file `params` unless they are given here.
 """
 
 import os
@@ -17,6 +17,9 @@ from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutd
 from launch.substitutions import Command, LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+
+NO_RADIUS = "the radius of the ball is not known: give tip_radius_mm:=R, or a scene:=FILE that names it (`touchup init` writes one)"
 
 
 def path(*below):
@@ -62,8 +65,12 @@ def actions(context):
     # an empty namespace is refused where none is not
     common = {"namespace": given("namespace") or None, "use_sim_time": given("use_sim_time") == "true"}
     robot, source = given("robot"), given("source")
-    # the frames are made of the scene that the node refines by
-    scene = absolute(given("scene")) or path("config", "default.yaml")
+    # the frames are made of the scene and the radius that the node refines by
+    scene, tip_radius_mm = absolute(given("scene")), given("tip_radius_mm")
+    if not scene and not tip_radius_mm:
+        raise RuntimeError(NO_RADIUS)
+    told = {"scene": scene, "tip_radius_mm": tip_radius_mm}
+    told = [f"{name}:={value}" for name, value in told.items() if value]
 
     parameters = {"source": text(source), "robot": text(robot), "use_sim_time": common["use_sim_time"]}
     if given("scan"):
@@ -72,6 +79,8 @@ def actions(context):
         parameters["mesh_unit"] = text(given("mesh_unit"))
     if given("sim_part"):
         parameters["sim_part"] = text(absolute(given("sim_part")))
+    if tip_radius_mm:
+        parameters["tip_radius_mm"] = float(tip_radius_mm)
     if given("allow_motion"):
         parameters["allow_motion"] = given("allow_motion") == "true"
     started = [
@@ -80,7 +89,7 @@ def actions(context):
             executable="touchup",
             name="touchup",
             namespace=common["namespace"],
-            arguments=["node", "--scene", scene],
+            arguments=["node", "--scene", scene] if scene else ["node"],
             parameters=[absolute(given("params")) or path("config", "node.yaml"), parameters],
             output="screen",
             # it saves when it ends
@@ -90,11 +99,11 @@ def actions(context):
     ]
 
     place = [f"{name}:={given(name)}" for name in ("ur_type", "robot_xyz", "robot_rpy", "tcp_xyz", "tcp_rpy") if given(name)]
-    started.append(frames("cell", [f"robot:={robot}", f"scene:={scene}", *place], common))
+    started.append(frames("cell", [f"robot:={robot}", *told, *place], common))
     # a UR arm holds the probe in its own tree
     tools = {source, "probe"} if robot != "none" else {source}
     held = {"probe"} if robot == "ur" else set()
-    started += [frames(tool, [f"scene:={scene}"], common) for tool in sorted(tools - held)]
+    started += [frames(tool, told, common) for tool in sorted(tools - held)]
 
     if given("rviz") == "auto" and not is_installed("rviz2"):
         started.append(LogInfo(msg="touchup: rviz2 is not installed, no viewer is started (apt install ros-$ROS_DISTRO-rviz2)"))
@@ -126,7 +135,8 @@ def generate_launch_description():
             argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touches."),
             argument("scan", default_value="", description="The mesh to refine: PLY, STL or OBJ."),
             argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
-            argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),
+            argument("scene", default_value="", description="The scene YAML; empty: the usual one."),
+            argument("tip_radius_mm", default_value="", description="Radius of the ball, mm; needed where no scene names it."),
             argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
             argument("rviz", default_value="auto", choices=["auto", *yes_no], description="Start RViz; auto: where it is installed."),
             argument("namespace", default_value="", description="Namespace of the node and of RViz."),

@@ -35,7 +35,7 @@ def player(context):
 def generate_launch_description():
     """The cell without an arm, and the player."""
     cell = os.path.join(get_package_share_directory("touchup"), "launch", "cell.launch.py")
-    passed_on = ("scan", "mesh_unit", "scene", "params", "source", "rviz", "namespace")
+    passed_on = ("scan", "mesh_unit", "scene", "tip_radius_mm", "params", "source", "rviz", "namespace")
     argument = DeclareLaunchArgument
     return LaunchDescription(
         [
@@ -43,7 +43,8 @@ def generate_launch_description():
             argument("speed", default_value="1", description="Speed, in multiples of the recorded one."),
             argument("scan", description="The mesh that was touched: PLY, STL or OBJ."),
             argument("mesh_unit", default_value="", choices=["", "m", "mm", "inch"], description="Unit of its file."),
-            argument("scene", default_value="", description="The scene YAML; empty: config/default.yaml."),
+            argument("scene", default_value="", description="The scene YAML; empty: the usual one."),
+            argument("tip_radius_mm", default_value="", description="Radius of the ball, mm; needed where no scene names it."),
             argument("params", default_value="", description="Parameters of the node; empty: config/node.yaml."),
             argument("source", default_value="stylus", choices=["stylus", "probe"], description="Who touched."),
             argument("rviz", default_value="auto", choices=["auto", "true", "false"], description="Start RViz; auto: where it is installed."),

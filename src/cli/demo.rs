@@ -82,7 +82,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
     let (scan_file, recording) = (out.join("scan.ply"), out.join("touch.mcap"));
     let mut files = RefineArguments::in_folder(scan_file, unit, recording, out, None, Topics::default());
-    files.tip_radius_mm = Some(stylus.radius * 1e3);
+    files.told.tip_radius_mm = Some(stylus.radius * 1e3);
     let Refined { summary, losses, .. } = files.refined()?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit)?;

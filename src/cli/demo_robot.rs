@@ -135,6 +135,7 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         unit: MeshUnit::Millimetre,
         flags: &flags,
         is_simulated: true,
+        is_forced: false,
         out,
     };
     let spheres = SPHERES
@@ -152,6 +153,9 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     probing.planned(&ready, &now)?;
     // nothing real moves: a signal ends it as any other verb
     let Done { summary, probed, outcome } = probing.done(&ready, &mut arm, false, &StopSignals::default())?;
+    if summary.refine.is_none() {
+        return outcome;
+    }
 
     let named = probed.iter().filter_map(feature_of).map(FeatureRecord::of).collect();
     compared(&CompareArguments::in_folder(out, named))?;

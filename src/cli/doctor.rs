@@ -1,19 +1,20 @@
 //! `touchup doctor`: what is wrong with a recording, before anything is made of it.
 
 use std::cell::RefCell;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
+use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::io::mesh_file::{MeshUnit, read_mesh};
 use crate::io::recording::{StampSource, Topics};
 use crate::mesh::FaceTree;
 use crate::replay::{Recording, each_sample, marker_filter};
-use crate::scene::Scene;
 use crate::stylus::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
@@ -42,12 +43,8 @@ pub(super) struct DoctorArguments {
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
-    /// Radius of the ball, mm; needed where no scene names it
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    tip_radius_mm: Option<f64>,
-    /// Stiffness of stylus and holder at the ball, N/mm
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
-    stiffness_n_per_mm: Option<f64>,
+    #[command(flatten)]
+    told: ToldFlags,
     /// Prints the findings as one JSON object
     #[arg(long)]
     json: bool,
@@ -58,8 +55,21 @@ pub(super) struct DoctorArguments {
 struct Diagnosis {
     /// whether nothing is surely wrong
     is_sound: bool,
+    /// what was told of tip and scan, and by what
+    told: ToldNumbers,
     /// the surest first
     findings: Vec<InputFinding>,
+}
+
+/// The numbers that were told, then a line for each finding.
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.told)?;
+        if self.findings.is_empty() {
+            return write!(f, "\nnothing speaks against scan and recording");
+        }
+        self.findings.iter().try_for_each(|finding| write!(f, "\n{finding}"))
+    }
 }
 
 /// Kind and exit code of an input that is not to be used.
@@ -67,7 +77,7 @@ pub(super) const UNSOUND: (&str, u8) = ("input", 3);
 
 /// The command: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
-    let scene = arguments.scene()?;
+    let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
     let scan = read_mesh(&arguments.scan, arguments.mesh_unit)?.mesh;
     let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
@@ -99,11 +109,8 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     )?;
     let findings = monitor.into_inner().findings(&scan, &FaceTree::new(&scan));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
-    let diagnosis = Diagnosis { is_sound: sure == 0, findings };
-    print_report(arguments.json, &diagnosis, || {
-        let lines = diagnosis.findings.iter().map(ToString::to_string).collect::<Vec<_>>();
-        if lines.is_empty() { "nothing speaks against scan and recording".to_owned() } else { lines.join("\n") }
-    })?;
+    let diagnosis = Diagnosis { is_sound: sure == 0, told, findings };
+    print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
     Ok(replayed.losses)
 }
@@ -121,21 +128,5 @@ pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: 
             Err(CliError::new(UNSOUND, format!("{input}: {finding}"), None))
         }
         None => Ok(()),
-    }
-}
-
-impl DoctorArguments {
-    /// The scene with the flags over it.
-    fn scene(&self) -> Result<Scene, CliError> {
-        let (mut scene, yaml) = match &self.scene {
-            Some(path) => Scene::read_with_text(path)?,
-            None => (Scene::default(), String::new()),
-        };
-        scene.tell_radius(&yaml, self.tip_radius_mm)?;
-        if let Some(stiffness) = self.stiffness_n_per_mm {
-            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
-        }
-        scene.validate().map_err(CliError::usage)?;
-        Ok(scene)
     }
 }

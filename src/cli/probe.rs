@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::arm::{ArmArguments, RobotName};
 use super::probing::{Done, Probing, Ready, flag_of, millimetres};
 use super::signals::StopSignals;
+use super::told::ToldNumbers;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
@@ -54,6 +55,9 @@ pub(super) struct ProbeArguments {
     /// Goes on with a probing that was broken off in the folder of --out: what is finished there is not probed again
     #[arg(long, conflicts_with = "dry_run")]
     resume: bool,
+    /// Writes mesh and features also where something of what the arm measured is surely wrong (`touchup doctor`)
+    #[arg(long, conflicts_with = "dry_run")]
+    force: bool,
     /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json, refined.ply, features.json, touches.csv,
     /// touches.png
     #[arg(long, value_name = "DIR")]
@@ -73,6 +77,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
         unit,
         flags: &flags,
         is_simulated: *robot == RobotName::Sim,
+        is_forced: arguments.force,
         out: &arguments.out,
     };
     let mut ready = probing.ready()?;
@@ -132,7 +137,7 @@ impl ProbeArguments {
         if !self.dry_run {
             return ready.may_move().map(|()| Losses::new());
         }
-        let report = DryRunReport::of(probing.flags, &plans, [x, y, z], self.out.join("plan.png"));
+        let report = DryRunReport::of(&ready.told, probing.flags, &plans, [x, y, z], self.out.join("plan.png"));
         print_report(self.json, &report, || report.to_string())?;
         Ok(Losses::new())
     }
@@ -160,7 +165,9 @@ impl ProbeArguments {
 
 reported! {
     /// What `--dry-run --json` prints.
-    struct DryRunReport, fn of(flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], drawn: PathBuf) {
+    struct DryRunReport, fn of(numbers: &ToldNumbers, flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], drawn: PathBuf) {
+        /// what was told of tip and scan, and by what
+        told: ToldNumbers = numbers.clone(),
         /// centre of the ball where the plan begins, in the frame of the scan
         from_mm: [f64; 3] = start_mm,
         features: Vec<PlannedFeature> =
@@ -216,6 +223,7 @@ impl fmt::Display for DryRunReport {
         writeln!(f, " can be made; nothing moved")?;
         let [x, y, z] = self.from_mm;
         writeln!(f, "planned from ({x:.1} {y:.1} {z:.1}) mm by the scene alone, without asking an arm where it is")?;
+        writeln!(f, "{}", self.told)?;
         for one in &self.features {
             write!(f, "feature {}: {}", one.flag, counted(one.touches, "touch", "touches"))?;
             if one.slides > 0 {
@@ -243,6 +251,7 @@ mod tests {
 
     use super::*;
     use crate::probing::plan::TouchPlan;
+    use crate::scene::Scene;
 
     #[test]
     fn a_slide_that_cannot_be_made_is_no_touch() {
@@ -257,8 +266,9 @@ mod tests {
         };
         assert_eq!(numbers(&planned.unreachable_touches), [(1, "reason 1".to_owned())]);
         assert_eq!(numbers(&planned.unreachable_slides), [(0, "reason 2".to_owned())]);
-        let text =
-            DryRunReport { from_mm: [0.0; 3], features: vec![planned], picture: PathBuf::from("plan.png") }.to_string();
+        let told = ToldNumbers::of(&Scene::default(), "", [None; 3]);
+        let features = vec![planned];
+        let text = DryRunReport { told, from_mm: [0.0; 3], features, picture: PathBuf::from("plan.png") }.to_string();
         assert!(text.starts_with("1 of 2 planned touches can be made; nothing moved\n"), "{text}");
         assert!(text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"), "{text}");
     }

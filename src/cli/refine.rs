@@ -15,7 +15,7 @@ use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
-use super::told::{ToldBy, ToldNumbers};
+use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
@@ -59,15 +59,8 @@ pub(super) struct RefineArguments {
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
-    /// Radius of the ball, mm; needed where no scene names it
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    pub tip_radius_mm: Option<f64>,
-    /// Stiffness of stylus and holder at the ball, N/mm
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
-    stiffness_n_per_mm: Option<f64>,
-    /// Standard deviation of the scan from the true surface, mm
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    scan_noise_mm: Option<f64>,
+    #[command(flatten)]
+    pub told: ToldFlags,
     /// The robust method, or the published one literally
     #[arg(long)]
     mode: Option<Mode>,
@@ -91,6 +84,9 @@ pub(super) struct RefineArguments {
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
+    /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is then a doubt and not sure
+    #[arg(skip)]
+    pub touches_flaws: bool,
     /// Strokes that were taken back or done again in the session
     #[arg(skip)]
     strokes: Vec<StrokeChange>,
@@ -365,7 +361,12 @@ impl RefineArguments {
         tree: &FaceTree,
         accepted: u64,
     ) -> Result<Vec<InputFinding>, CliError> {
-        let findings = monitor.findings(scan, tree);
+        let mut findings = monitor.findings(scan, tree);
+        if self.touches_flaws {
+            let off_the_scan = findings.iter_mut().filter(|finding| finding.cause.is_read_off_the_scan());
+            off_the_scan.for_each(|finding| finding.is_sure = false);
+            findings.sort_by_key(|finding| !finding.is_sure);
+        }
         if !self.force {
             refuse_unsound(&findings, &self.scan, &self.bag)?;
             if accepted == 0 {
@@ -422,24 +423,10 @@ impl RefineArguments {
 
     /// The scene with the flags over it, and by what its numbers are told.
     fn scene(&self) -> Result<(Scene, ToldNumbers), CliError> {
-        let (mut scene, yaml) = match &self.scene {
-            Some(path) => Scene::read_with_text(path)?,
-            None => (Scene::default(), String::new()),
-        };
-        scene.tell_radius(&yaml, self.tip_radius_mm)?;
-        if let Some(stiffness) = self.stiffness_n_per_mm {
-            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
-        }
-        if let Some(noise_mm) = self.scan_noise_mm {
-            scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
-        }
+        let (mut scene, told) = self.told.scene(self.scene.as_deref())?;
         if let Some(mode) = self.mode {
             scene.refine.get_or_insert_default().mode = mode;
         }
-        // the file was in range when it was read: what is not now came by a flag
-        scene.validate().map_err(CliError::usage)?;
-        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
-        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
         Ok((scene, told))
     }
 }

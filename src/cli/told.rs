@@ -1,10 +1,52 @@
 //! The numbers of tip and scan that a result depends on, and who told them.
 
 use std::fmt;
+use std::path::Path;
 
+use clap::Args;
 use serde::Serialize;
 
+use super::CliError;
 use crate::scene::Scene;
+
+/// The flags that tell of tip and scan, over the scene.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct ToldFlags {
+    /// Radius of the ball, mm; needed where no scene names it
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    pub tip_radius_mm: Option<f64>,
+    /// Stiffness of stylus and holder at the ball, N/mm
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    stiffness_n_per_mm: Option<f64>,
+    /// Standard deviation of the scan from the true surface, mm
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    scan_noise_mm: Option<f64>,
+}
+
+impl ToldFlags {
+    /// The scene of a file, or the usual one, with the flags over it, and by what its numbers are told.
+    ///
+    /// # Errors
+    /// Where nobody told the radius, and for a scene or a flag out of its range.
+    pub fn scene(&self, path: Option<&Path>) -> Result<(Scene, ToldNumbers), CliError> {
+        let (mut scene, yaml) = match path {
+            Some(path) => Scene::read_with_text(path)?,
+            None => (Scene::default(), String::new()),
+        };
+        scene.tell_radius(&yaml, self.tip_radius_mm)?;
+        if let Some(stiffness) = self.stiffness_n_per_mm {
+            scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
+        }
+        if let Some(noise_mm) = self.scan_noise_mm {
+            scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
+        }
+        // the file was in range when it was read: what is not now came by a flag
+        scene.validate().map_err(CliError::usage)?;
+        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
+        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
+        Ok((scene, told))
+    }
+}
 
 /// A number that the result depends on.
 #[derive(Clone, Debug, Serialize)]

@@ -43,7 +43,7 @@ def installation(tmp_path_factory):
 
 
 def launched(file, **arguments):
-    """Nodes that a launch file starts, by name."""
+    """Nodes that a launch file starts, by name; the radius of the ball is 1.5 mm unless they are told another."""
     return visited(file, **arguments)[0]
 
 
@@ -54,7 +54,7 @@ def visited(file, **arguments):
     description = runpy.run_path(str(ROOT / "launch" / file))["generate_launch_description"]()
     declared = {entity.name for entity in description.entities if hasattr(entity, "default_value")}
     assert set(arguments) <= declared
-    context = LaunchContext(arguments)
+    context = LaunchContext({"tip_radius_mm": "1.5", **arguments})
     visit(description.entities, context)
     assert len({node.name for node in context.nodes}) == len(context.nodes), "two nodes of one name"
     return {node.name: node for node in context.nodes}, context.lines
@@ -132,9 +132,9 @@ def test_a_cell_starts_the_node_its_frames_and_rviz(robot, source, tools):
     assert set(nodes) == {"touchup", "rviz", "cell_state_publisher"} | {f"{tool}_state_publisher" for tool in tools}
 
     node = nodes["touchup"]
-    assert (node.package, node.executable, node.arguments[:2]) == ("touchup", "touchup", ["node", "--scene"])
-    assert Path(node.arguments[2]).samefile(ROOT / "config/default.yaml")
-    assert node.parameters == {"robot": robot, "source": source, "scan": str(Path("part.ply").absolute()), "use_sim_time": False}
+    assert (node.package, node.executable, node.arguments) == ("touchup", "touchup", ["node"])
+    told = {"scan": str(Path("part.ply").absolute()), "tip_radius_mm": 1.5}
+    assert node.parameters == {"robot": robot, "source": source, "use_sim_time": False, **told}
     assert [Path(file).name for file in node.files] == ["node.yaml"] and Path(node.files[0]).is_file()
     known = yaml.safe_load((ROOT / "config/node.yaml").read_text())["/**"]["ros__parameters"]
     assert set(node.parameters) <= {*known, "use_sim_time"}
@@ -177,6 +177,26 @@ def test_descriptions_do_not_share_a_topic():
 def test_a_wrong_value_is_refused(wrong):
     with pytest.raises(RuntimeError, match="is not valid"):
         launched("cell.launch.py", **wrong)
+
+
+@pytest.mark.parametrize("file", ["cell.launch.py", "replay.launch.py"])
+def test_the_radius_of_the_ball_is_told_to_node_and_frames(file, tmp_path):
+    scene = tmp_path / "cell.yaml"
+    scene.write_text("tip: { radius_mm: 2.5 }\n")
+    recording = {"recording": "touch.mcap", "scan": "scan.ply"} if file.startswith("replay") else {}
+    with pytest.raises(RuntimeError, match="the radius of the ball is not known: give tip_radius_mm:="):
+        launched(file, tip_radius_mm="", **recording)
+    # the scene tells it, the argument does, or the argument over the scene
+    for told, parameter, radius in [
+        ({"scene": str(scene), "tip_radius_mm": ""}, None, "0.0025"),
+        ({"tip_radius_mm": "3"}, 3.0, "0.003"),
+        ({"scene": str(scene), "tip_radius_mm": "3"}, 3.0, "0.003"),
+    ]:
+        nodes = launched(file, **told, **recording)
+        assert nodes["touchup"].parameters.get("tip_radius_mm") == parameter
+        assert nodes["touchup"].arguments == (["node", "--scene", str(scene)] if "scene" in told else ["node"])
+        stylus = tree.fromstring(nodes["stylus_state_publisher"].parameters["robot_description"])
+        assert {sphere.get("radius") for sphere in stylus.iter("sphere")} == {radius}
 
 
 def test_text_stays_text(tmp_path):

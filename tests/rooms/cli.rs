@@ -380,6 +380,26 @@ fn a_scene_that_names_no_radius_has_told_none() {
     assert_eq!(code(&touchup(&told, "")), 0);
 }
 
+/// By the words and the keys of `refine`, with the flags over the scene.
+#[test]
+fn doctor_says_what_was_told_of_tip_and_scan_and_by_what() {
+    let case = Case::new();
+    let path = |name: &str| case.path(name).to_str().unwrap().to_owned();
+    let (scene, scan, bag, out) = (path("cell.yaml"), path("scan.ply"), path("touch.mcap"), path("out.ply"));
+    fs::write(&scene, "tip: { radius_mm: 1.4 }\n").unwrap();
+    let flags = ["--scene", &scene, "--stiffness-n-per-mm", "25", "--scan-noise-mm", "0.3"];
+    let doctor = |more: &[&str]| touchup(&[&["doctor", &scan, &bag][..], &flags, more].concat(), "");
+    let line = "tip: radius 1.4000 mm (scene), stiffness 25.0000 N/mm (flag); scan: noise 0.300 mm (flag)";
+    assert_eq!(text(&doctor(&[]).stdout).lines().next(), Some(line));
+    let told = &json(&doctor(&["--json"]))["told"];
+    let refine = [&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--json"][..], &flags].concat();
+    assert_eq!(*told, json(&touchup(&refine, ""))["told"]);
+    let number = |value: f64, source: &str| serde_json::json!({ "value": value, "source": source });
+    assert_eq!(told["tip_radius_mm"], number(1.4, "scene"));
+    assert_eq!(told["stiffness_n_per_mm"], number(25.0, "flag"));
+    assert_eq!(told["scan_noise_mm"], number(0.3, "flag"));
+}
+
 /// What a node prints before it is on the network.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 #[test]

@@ -40,6 +40,8 @@ pub(super) struct Probing<'a> {
     pub flags: &'a [Flag],
     /// the simulated arm waits for viewers; a real one does not
     pub is_simulated: bool,
+    /// the mesh is written also where something of the input is surely wrong
+    pub is_forced: bool,
     pub out: &'a Path,
 }
 
@@ -80,7 +82,7 @@ impl Probing<'_> {
     }
 
     /// Probes all flags, in their order; each touch and each feature is written as soon as it is there. A stop of the arm ends
-    /// it, and a signal.
+    /// it, and a signal. Where what was measured is surely wrong no mesh is written, unless that is forced.
     ///
     /// - `is_resumed`: what is finished in the folder is not probed again.
     pub fn done(
@@ -129,26 +131,42 @@ impl Probing<'_> {
                 self.flags.len(),
                 self.out.join(TOUCHES).display()
             ));
-            return Ok(Done { summary: ProbingSummary { check, features, refine: None }, probed, outcome: Err(error) });
+            let summary = ProbingSummary { check, features, told: ready.told.clone(), refine: None };
+            return Ok(Done { summary, probed, outcome: Err(error) });
         }
+        let touched = folder.touches()?;
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let bag = self.out.join(RECORDING);
         let mut arguments = RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
-        // what the arm has touched is written, whatever is said of it
-        arguments.force = true;
-        let Refined { summary: refine, mut losses, .. } = arguments.refined()?;
+        // an arm that met no surface has measured nothing that could be wrong: each feature says why
+        arguments.force = self.is_forced || touched.iter().all(|touch| touch.centre_mm.is_none());
+        // all but a plane is probed where the scan may lack it
+        arguments.touches_flaws = self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane));
+        let (refine, mut losses, failed) = match arguments.refined() {
+            Ok(Refined { summary, losses, .. }) => (Some(summary), losses, None),
+            Err(error) => (None, Losses::new(), Some(error)),
+        };
         losses.extend(features.iter().filter_map(ProbedRecord::loss));
         let not_begun = self.flags.len() - features.len();
         if not_begun > 0 {
             losses.push(format!("{not_begun} of {} flags were not begun", self.flags.len()));
         }
-        let outcome = match ended {
-            Some(ending @ Ending::Stopped(_)) => Err(CliError::ended(ending).with(losses.join("; "))),
-            _ => Ok(losses),
+        let outcome = match (ended, failed) {
+            (Some(ending @ Ending::Stopped(_)), failed) => {
+                losses.extend(failed.map(|error| error.message));
+                Err(CliError::ended(ending).with(losses.join("; ")))
+            }
+            (_, Some(failed)) => Err(failed.with(format_args!(
+                "the touches ({touches}) are in {}; --resume --force makes the mesh of them",
+                self.out.join(TOUCHES).display()
+            ))),
+            (_, None) => Ok(losses),
         };
-        let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
-        draw_touches(&mesh, &folder.touches()?, &probed, self.flags, &self.out.join("touches.png"))?;
-        Ok(Done { summary: ProbingSummary { check, features, refine: Some(refine) }, probed, outcome })
+        if refine.is_some() {
+            let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
+            draw_touches(&mesh, &touched, &probed, self.flags, &self.out.join("touches.png"))?;
+        }
+        Ok(Done { summary: ProbingSummary { check, features, told: ready.told.clone(), refine }, probed, outcome })
     }
 }
 

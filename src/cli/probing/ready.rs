@@ -8,6 +8,7 @@ use tracing::info;
 
 use crate::calibrate::{ReferenceSphere, beside_spheres};
 use crate::cli::arm_errors::ArmErrorsName;
+use crate::cli::told::{ToldFlags, ToldNumbers};
 use crate::cli::{CliError, require};
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::mesh::TriMesh;
@@ -31,6 +32,8 @@ pub(in crate::cli) struct Ready {
     pub cell: Cell,
     pub params: ProbeParams,
     pub scene: Scene,
+    /// what it tells of tip and scan
+    pub told: ToldNumbers,
     pub(super) mesh: TriMesh,
     /// beside the part
     pub spheres: Vec<ReferenceSphere>,
@@ -47,13 +50,12 @@ const NO_MOTION: &str =
 impl Ready {
     /// Reads scene and scan; the scene tells the radius of the ball.
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
-        let (mut scene, yaml) = Scene::read_with_text(scene)?;
-        scene.tell_radius(&yaml, None)?;
+        let (scene, told) = ToldFlags::default().scene(Some(scene))?;
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
         let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
         info!(%repair, "scan");
         let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
-        Ok(Self { cell, params, scene, mesh, spheres: Vec::new(), check })
+        Ok(Self { cell, params, scene, told, mesh, spheres: Vec::new(), check })
     }
 
     /// The same with spheres beside the part.

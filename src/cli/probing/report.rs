@@ -6,6 +6,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::cli::refine::RefineSummary;
+use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
@@ -155,7 +156,9 @@ pub(super) struct ProbedFile {
 pub(in crate::cli) struct ProbingSummary {
     pub check: CheckOfResults,
     pub features: Vec<ProbedRecord>,
-    /// of the mesh; not there where a signal ended the probing
+    /// what was told of tip and scan, and by what
+    pub told: ToldNumbers,
+    /// of the mesh; not there where a signal ended the probing, and where the mesh was not written
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<RefineSummary>,
 }
@@ -189,7 +192,11 @@ impl fmt::Display for ProbingSummary {
             writeln!(f)?;
         }
         writeln!(f, "{}", self.check.summary)?;
-        self.refine.iter().try_for_each(|refine| write!(f, "{refine}"))
+        // the summary of the mesh has what was told
+        match &self.refine {
+            Some(refine) => write!(f, "{refine}"),
+            None => write!(f, "{}", self.told),
+        }
     }
 }
 

@@ -52,6 +52,32 @@ names! {
     }
 }
 
+impl InputCause {
+    /// Whether it is read off how the contacts lie on the scan: no certainty where the scan lacks what was touched.
+    pub fn is_read_off_the_scan(self) -> bool {
+        match self {
+            Self::LengthUnit
+            | Self::PositionAxes
+            | Self::Frame
+            | Self::Radius
+            | Self::WrenchSign
+            | Self::WrenchFrame
+            | Self::QuaternionOrder => true,
+            Self::ZeroStamps
+            | Self::TwoEpochs
+            | Self::StampsGoBack
+            | Self::SlowPoses
+            | Self::Delay
+            | Self::NoSample
+            | Self::NoContact
+            | Self::Tare
+            | Self::ForceUnit
+            | Self::LightTouch
+            | Self::Saturation => false,
+        }
+    }
+}
+
 /// A doubt about the input, what was measured, and what to do.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InputFinding {

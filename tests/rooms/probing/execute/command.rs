@@ -4,9 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use nalgebra::Point3;
-use serde_json::Value;
+use nalgebra::{Point3, Vector3};
+use serde_json::{Value, json};
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
+use touchup::mesh::TriMesh;
 use touchup::sim::{ArmErrorSigmas, ArmErrors, Plate, Surface};
 
 use crate::full::either;
@@ -153,8 +154,13 @@ fn a_dry_run_draws_the_plan_and_moves_nothing() {
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let text = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(text.lines().next().unwrap().ends_with("planned touches can be made; nothing moved"), "{text}");
+    let told = "\ntip: radius 1.5000 mm (scene), stiffness 15.0000 N/mm (scene); scan: noise 0.600 mm (default)\n";
+    assert!(text.contains(told), "{text}");
     let done = probe(folder.path(), forbid, &[&hole[..], &["--json"]].concat());
     let plan: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let number = |value: f64, source: &str| json!({ "value": value, "source": source });
+    assert_eq!(plan["told"]["tip_radius_mm"], number(1.5, "scene"));
+    assert_eq!(plan["told"]["scan_noise_mm"], number(0.6, "default"));
     let [feature] = plan["features"].as_array().unwrap().as_slice() else { panic!("{plan}") };
     let planned = format!("feature 1: {} touches planned", feature["touches"]);
     assert!(feature["touches"].as_u64().unwrap() > 0 && text.contains(&planned), "{plan} {text}");
@@ -188,6 +194,73 @@ fn a_dry_run_connects_to_no_arm() {
         "{}",
         stderr(&far)
     );
+}
+
+/// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe` refuse that by the same words, and what was
+/// touched is kept.
+#[test]
+fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, truth] = cell(folder.path(), |scene| scene);
+    let part = Plate::default().mesh(1e-5).unwrap();
+    let faces = part.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
+    let lower = part.positions().iter().map(|p| p - Vector3::z() * 2e-3).collect();
+    let lower = TriMesh::new(lower, faces).unwrap();
+    write_mesh(Path::new(&truth), &lower, MeshUnit::Millimetre).unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (out, scan, bag, again) = (path("out"), path("scan.ply"), path("out/recording"), path("again.ply"));
+    let probe = ["probe", "--robot", "sim", "--scene", &scene, "--truth", &truth, "--out", &out, "--json"];
+    let probe = |more: &[&str]| touchup(&[&probe[..], &["--feature", "plane@45,8,12"], more].concat());
+    let refine = ["refine", "--scene", &scene, "--scan", &scan, "--bag", &bag, "--out", &again, "--json"];
+    let topics = ["--wrench-topic", "/probe/wrench", "--pose-topic", "/probe/pose"];
+    let refine = |more: &[&str]| touchup(&[&refine[..], &topics, more].concat());
+    let json = |text: &[u8]| -> Value { serde_json::from_slice(text).unwrap() };
+    let files = ["refined.ply", "features.json", "touches.csv", "touches.png"];
+    let are_there = || files.map(|name| folder.path().join("out").join(name).exists());
+
+    let done = probe(&[]);
+    assert_eq!(done.status.code(), Some(3), "{}", stderr(&done));
+    assert_eq!(are_there(), [false; 4]);
+    let summary = json(&done.stdout);
+    assert_eq!(summary["features"][0]["code"], "tolerance_reached");
+    assert!(summary.get("refine").is_none() && summary["told"]["tip_radius_mm"]["value"] == 1.5, "{summary}");
+    let touches = fs::read(path("out/probed_touches.jsonl")).unwrap();
+    assert!(touches.iter().filter(|&&byte| byte == b'\n').count() > 3);
+    let [of_probe, of_refine] = [&done, &refine(&[])].map(|done| json(&done.stderr));
+    let [of_probe, of_refine] = [&of_probe, &of_refine].map(|error| error["message"].as_str().unwrap());
+    assert!(of_refine.contains("off the scan where it presses"), "{of_refine}");
+    assert!(of_probe.starts_with(of_refine) && of_probe.contains("--resume --force"), "{of_probe}");
+
+    let forced = probe(&["--resume", "--force"]);
+    assert_eq!(forced.status.code(), Some(0), "{}", stderr(&forced));
+    assert_eq!(are_there(), [true; 4]);
+    assert_eq!(fs::read(path("out/probed_touches.jsonl")).unwrap(), touches);
+    let summary = json(&forced.stdout);
+    assert_eq!(
+        (&summary["refine"]["findings"][0]["is_sure"], &summary["refine"]["told"]),
+        (&true.into(), &summary["told"])
+    );
+    assert_eq!(refine(&["--force"]).status.code(), Some(0));
+    assert!(fs::read(&again).unwrap() == fs::read(path("out/refined.ply")).unwrap());
+    // and at once, in the place of the probing before
+    fs::remove_file(path("out/refined.ply")).unwrap();
+    let done = probe(&["--force"]);
+    assert_eq!((done.status.code(), are_there()), (Some(0), [true; 4]), "{}", stderr(&done));
+}
+
+/// The scan has closed the slot: four of five contacts are off it, and with y and z swapped more of them would be on it. That is what an arm is sent
+/// for, and no mistake.
+#[test]
+fn what_the_scan_has_lost_is_probed_without_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let slot = ["--feature", "slot@26.1,13.1,12", "--tolerance-mm", "0.2", "--json"];
+    let done = probe(folder.path(), |scene| scene, &slot);
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let findings = summary["refine"]["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|finding| finding["cause"] == "position_axes"), "{summary}");
+    assert!(findings.iter().all(|finding| finding["is_sure"] == false), "{summary}");
+    assert!(folder.path().join("out/refined.ply").exists());
 }
 
 /// A tolerance below what a touch can be known by, and too few touches for a hole.
