@@ -21,7 +21,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("plan", "numeric parameters stylus mesh features"),
     ("arm", "numeric parameters stylus plan"),
     ("execute", "numeric parameters stylus mesh features calibrate plan arm"),
-    ("sim", "numeric stylus mesh calibrate arm"),
+    ("sim", "numeric stylus mesh calibrate diagnose arm"),
     ("features", "numeric stylus mesh"),
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),
@@ -31,7 +31,10 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io"),
-    ("report", "numeric stylus mesh reconstruct haptic live features align sim compare io scene session replay"),
+    (
+        "report",
+        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scene session replay",
+    ),
     ("ur", "clock stylus plan arm"),
     (
         "ros",

@@ -98,7 +98,7 @@ pub struct ReportArguments {
     /// Tip, sensor and frames of the recording
     #[arg(long, value_name = "YAML", requires = "scan")]
     scene: Option<PathBuf>,
-    /// Seeds of the worlds of the coverage and mistakes chapters, first and last [default: 1-20, with --quick 1-1]
+    /// Seeds of the worlds of the coverage and mistakes chapters, first and last [default: 1-20 and 1-5, with --quick 1-1]
     #[arg(long, value_name = "A-B")]
     seeds: Option<Seeds>,
     /// Only these chapters

@@ -65,7 +65,9 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("poses in mm", InputCause::LengthUnit, |x| x.positions(|p| p * 1e3)),
     mistake("tip in m", InputCause::Radius, |x| x.tip(|tip| tip.radius *= 1e-3)),
     mistake("radius times 4", InputCause::Radius, |x| x.tip(|tip| tip.radius *= 4.0)),
-    mistake("stiffness a thousandth", InputCause::Stiffness, |x| x.tip(|tip| tip.stiffness = tip.stiffness.map(|k| k / 1e3))),
+    mistake("stiffness a thousandth", InputCause::Stiffness, |x| {
+        x.tip(|tip| tip.stiffness = tip.stiffness.map(|k| k / 1e3))
+    }),
     mistake("force in gram", InputCause::ForceUnit, |x| x.forces(|f| f * 101.97)),
     mistake("force in kN", InputCause::ForceUnit, |x| x.forces(|f| f * 1e-3)),
     mistake("scan shifted 30 mm up", InputCause::Frame, |x| x.scan(|p| p + Vector3::z() * 30e-3)),

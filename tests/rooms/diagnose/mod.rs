@@ -4,11 +4,12 @@ use crate::full::is_full;
 use touchup::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
 use touchup::mesh::FaceTree;
 use touchup::sim::{
-    INPUT_MISTAKES, InputMistake, PathParams, Plate, ScannerParams, SensorParams, StylusParams, ToldRecording, plan_demo,
-    scan, touch,
+    INPUT_MISTAKES, InputMistake, PathParams, Plate, ScannerParams, SensorParams, StylusParams, ToldRecording,
+    plan_demo, scan, touch,
 };
 use touchup::stylus::{
-    CompensatorParams, ContactEstimator, ContactEstimatorParams, Placement, SyncParams, Synchroniser, TipParams, TipShape,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, Placement, SyncParams, Synchroniser, TipParams,
+    TipShape,
 };
 
 /// Another stylus, sensor and scan for each seed.

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Vector3};
 use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
 use touchup::stylus::{
-    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Sample, SyncParams, Synchroniser, TipParams,
-    Wrench,
+    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Sample, SyncParams,
+    Synchroniser, TipParams, Wrench,
 };
 
 fn contacts() -> ContactEstimator {
@@ -74,7 +74,7 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
             let since_pose = (ms % 600 - 300) as f64;
             let since_force = (ms as f64 - late_ms).rem_euclid(600.0) - 300.0;
             let height = if since_pose < 0.0 { -since_pose * 50e-6 } else { 0.0 };
-            let force = if since_force < 280.0 { 2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp()) } else { 0.0 };
+            let force = if since_force < 300.0 { 2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp()) } else { 0.0 };
             sample(ms, height, force)
         };
         let found = offset_of((0..12_000).map(at)).unwrap();
@@ -122,7 +122,7 @@ fn where_a_slow_sensor_taps_the_gap_without_force_gives_the_delay() {
             sample(ms, up * 50e-6, if phase(ms - late_ms) < 0.0 { 2.0 } else { 0.0 })
         };
         let found = offset_of((0..12_000).step_by(8).map(at)).unwrap();
-        assert!((found.offset * 1e3 - late_ms as f64).abs() < 6.0, "{late_ms} ms: {found:?}");
+        assert!((found.offset * 1e3 - late_ms as f64).abs() < 4.0, "{late_ms} ms: {found:?}");
         assert!(matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 6e-3, "{found:?}");
     }
 }

@@ -25,6 +25,8 @@ names! {
         NoContact = "no_contact",
         /// Forces in another unit.
         ForceUnit = "force_unit",
+        /// Contacts whose force is below the threshold of contact.
+        LightTouch = "light_touch",
         /// Poses, scan or radius in another unit of length.
         LengthUnit = "length_unit",
         /// Axes of the positions are swapped or mirrored.
@@ -45,8 +47,6 @@ names! {
         Stiffness = "stiffness",
         /// Forces clipped at one value.
         Saturation = "saturation",
-        /// Contacts whose force is below the threshold of contact.
-        LightTouch = "light_touch",
         /// A force that is there while nothing is touched.
         Tare = "tare",
     }
@@ -60,6 +60,7 @@ impl InputCause {
             | Self::PositionAxes
             | Self::Frame
             | Self::Radius
+            | Self::Stiffness
             | Self::WrenchSign
             | Self::WrenchFrame
             | Self::QuaternionOrder => true,

@@ -6,13 +6,15 @@ use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, NOISES, axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
 use super::mends::PlaceMend;
-use super::monitor::{FEWEST_PRESSES, InputMonitorParams};
+use super::monitor_params::InputMonitorParams;
 use super::places::{ALIKE, BallFit, ScanScale, extent_of};
-use super::shift::best_shift;
+use super::shift::{ContactShift, best_shift};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::NormalEquations;
 use crate::stylus::{ClockOffset, TipParams, TipShape, WrenchFrame};
 
+/// Fewer presses say nothing.
+pub(super) const FEWEST_PRESSES: usize = 20;
 /// Presses that are compared with the scan.
 const MOST_PRESSES: usize = 400;
 /// The sign and axes of a wrench are right when the force leans from the normal by less than this on average, as cosine.
@@ -131,10 +133,7 @@ impl InputJudge<'_> {
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
         findings.extend(place.map(|(finding, _)| finding));
         let is_of_poses = |finding: &InputFinding| {
-            matches!(
-                finding.cause,
-                InputCause::LengthUnit | InputCause::PositionAxes | InputCause::QuaternionOrder
-            )
+            matches!(finding.cause, InputCause::LengthUnit | InputCause::PositionAxes | InputCause::QuaternionOrder)
         };
         let wrench = is_placed.then(|| self.judge_wrench(&presses)).flatten();
         // what turns the force turns its course too
@@ -180,7 +179,8 @@ impl InputJudge<'_> {
         }
         let rest = rest_t.norm();
         let is_unit = findings.iter().any(|finding| finding.cause == InputCause::ForceUnit);
-        if let Some((count, gate)) = resting.zip(gate).filter(|(_, gate)| rest > LARGEST_REST * gate.free && !is_unit) {
+        let is_rest = !is_unit && gate.is_some_and(|gate| rest > LARGEST_REST * gate.free);
+        if let Some(count) = resting.filter(|_| is_rest) {
             let error = noise / (count as f64 / ALIKE).sqrt();
             let measured = format!(
                 "far from the scan the force is ({:.2}, {:.2}, {:.2}) ± {error:.2} N in the axes of the stylus",
@@ -231,14 +231,8 @@ impl InputJudge<'_> {
         if !is_on_scan && may_be_ball && reported.scatter <= noise + 0.2 * scale.edge + 0.1e-3 {
             return Some(off_by_radius());
         }
-        if let Some(finding) = self.shift(presses, &reported) {
-            return Some((finding, is_on_scan));
-        }
-        if is_on_scan {
-            return None;
-        }
         let shown = |scale: f64| 1e3 * scale;
-        let measured = format!(
+        let mut measured = format!(
             "the ball's centre is {:.2} ± {:.2} mm off the scan where it presses, and its radius is {:.2} mm; {:.0} % of \
              the contacts are on the scan",
             shown(reported.distance),
@@ -246,6 +240,14 @@ impl InputJudge<'_> {
             shown(radius),
             100.0 * reported.share
         );
+        if let Some(ContactShift { shift, share }) = self.shift(presses, &reported) {
+            let [x, y, z] = [shift.x, shift.y, shift.z].map(shown);
+            measured += &format!(", and shifted by ({x:.1}, {y:.1}, {z:.1}) mm {:.0} % are", 100.0 * share);
+            return Some((InputFinding::new(InputCause::Frame, true, measured, FRAME_REMEDY), is_on_scan));
+        }
+        if is_on_scan {
+            return None;
+        }
         // a rough scan: most are less than a radius off, and hardly one is far
         let wide = radius.max(*tolerance) + sunk;
         let share_within = |distance: f64| self.fit(records, distance).share;
@@ -266,9 +268,8 @@ impl InputJudge<'_> {
             let centres: Vec<Point3<f64>> = records.iter().map(|record| mend.centre(placement, record)).collect();
             let extent = extent_of(centres.iter().copied());
             let is_spread = SHARES_OF_SCAN.contains(&(extent / scale.extent)) && extent > LEAST_SPREAD * tolerance;
-            is_spread.then(|| {
-                (BallFit::of(self.scan, self.tree, centres.into_iter(), radius * unit, tolerance).share, mend)
-            })
+            is_spread
+                .then(|| (BallFit::of(self.scan, self.tree, centres.into_iter(), radius * unit, tolerance).share, mend))
         };
         let mends = PlaceMend::units().chain([PlaceMend::w_first()]).chain(PlaceMend::axes());
         let (share, mend) = mends.filter_map(fit).max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -287,8 +288,8 @@ impl InputJudge<'_> {
         is_mended.then(|| InputFinding::new(mend.cause, true, measured, remedy))
     }
 
-    /// All contacts shifted.
-    fn shift(&self, presses: &Presses, reported: &BallFit) -> Option<InputFinding> {
+    /// The shift of all contacts that brings many more of them onto the scan; `None` where none does.
+    fn shift(&self, presses: &Presses, reported: &BallFit) -> Option<ContactShift> {
         let Presses { records, sunk, tolerance, .. } = presses;
         if reported.share + SHIFT_GAIN > 1.0 {
             return None;
@@ -299,15 +300,7 @@ impl InputJudge<'_> {
         let is_one = best.shift.norm() > LEAST_SHIFT * tolerance
             && best.share >= SHIFTED_SHARE
             && best.share >= reported.share + SHIFT_GAIN;
-        let measured = format!(
-            "{:.0} % of the contacts are on the scan, and {:.0} % when all are shifted by ({:.1}, {:.1}, {:.1}) mm",
-            100.0 * reported.share,
-            100.0 * best.share,
-            best.shift.x * 1e3,
-            best.shift.y * 1e3,
-            best.shift.z * 1e3
-        );
-        is_one.then(|| InputFinding::new(InputCause::Frame, true, measured, FRAME_REMEDY))
+        is_one.then_some(best)
     }
 
     /// What is wrong with the direction of the forces.
@@ -421,8 +414,7 @@ impl InputJudge<'_> {
     }
 }
 
-const FRAME_REMEDY: &str =
-    "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
+const FRAME_REMEDY: &str = "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
 const W_LAST: &str = "give the orientation as x, y, z, w";
 
 fn off_by_radius(fit: &BallFit, radius: f64, error: f64) -> InputFinding {

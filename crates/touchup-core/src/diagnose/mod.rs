@@ -10,9 +10,11 @@ mod input_record;
 mod judge;
 mod mends;
 mod monitor;
+mod monitor_params;
 mod places;
 mod shift;
 mod stamps;
 
 pub use finding::{InputCause, InputFinding};
-pub use monitor::{InputMonitor, InputMonitorParams};
+pub use monitor::InputMonitor;
+pub use monitor_params::InputMonitorParams;

@@ -4,42 +4,21 @@ use nalgebra::Vector3;
 
 use super::finding::{InputCause, InputFinding};
 use super::input_record::InputRecord;
-use super::judge::InputJudge;
+use super::judge::{FEWEST_PRESSES, InputJudge};
+use super::monitor_params::InputMonitorParams;
 use super::stamps::InputStamps;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::median;
 use crate::stylus::{
-    ClockEstimator, ClockOffset, Compensator, CompensatorParams, ContactGateParams, ContactSample, Message, Placement,
-    Sample, SettingError, SyncParams, TipParams, TipShape,
+    ClockEstimator, ClockEvidence, ClockOffset, Compensator, ContactSample, Message, Sample, SettingError,
 };
 
 /// Samples that are kept: 60 s at 1 kHz are one in sixteen.
 const MOST_RECORDS: usize = 4096;
 /// Force steps that the noise is estimated from.
 const MOST_STEPS: usize = 4096;
-/// Fewer presses say nothing.
-pub(super) const FEWEST_PRESSES: usize = 20;
 /// Median length of a vector of three standard normal components.
 const MEDIAN_OF_THREE: f64 = 1.538;
-/// What the input is taken for.
-#[derive(Clone, Copy, Debug)]
-pub struct InputMonitorParams {
-    /// weight, constant bias, frames
-    pub compensator: CompensatorParams,
-    /// size and stiffness of the tip
-    pub tip: TipParams,
-    /// of any other than a ball the radius is not checked
-    pub shape: TipShape,
-    /// standard deviation of the scan, m; 0: not known
-    pub scan_noise: f64,
-    /// how the recorded poses were placed
-    pub placement: Placement,
-    /// thresholds of contact; `None`: every sample is contact
-    pub gate: Option<ContactGateParams>,
-    /// of the pairing
-    pub sync: SyncParams,
-}
-
 /// Doubts the input while it is replayed or measured. Memory is bounded, and a sample costs a rotation.
 #[derive(Clone, Debug)]
 pub struct InputMonitor {
@@ -126,9 +105,15 @@ impl InputMonitor {
         self.clock.push(sample);
     }
 
-    /// How late the wrench reads; `None` where the contacts do not determine it.
+    /// How late the wrench reads; `None` where the contacts do not determine it. Where the ball stops between two poses is not seen: that is
+    /// part of the uncertainty of onsets. Sliding and lifting are not shifted by it.
     pub fn clock_offset(&self) -> Option<ClockOffset> {
-        self.clock.offset()
+        let found = self.clock.offset()?;
+        let unseen = match found.evidence {
+            ClockEvidence::Onsets(_) => self.stamps.pose_period() / 2.0,
+            ClockEvidence::Course(_) => 0.0,
+        };
+        Some(ClockOffset { sigma: found.sigma.hypot(unseen), ..found })
     }
 
     /// All doubts so far, the surest and most basic first; empty: none.
@@ -152,7 +137,7 @@ impl InputMonitor {
             records: &self.records,
             noise,
             largest: (self.largest.0, self.largest.1, self.samples),
-            clock: self.clock.offset(),
+            clock: self.clock_offset(),
         };
         findings.extend(judge.findings());
         findings.sort_by_key(|finding| (!finding.is_sure, finding.cause as usize));

@@ -53,6 +53,11 @@ impl InputStamps {
         stream.push(message.stamp_ns());
     }
 
+    /// Median time between two poses, s.
+    pub fn pose_period(&self) -> f64 {
+        median(&mut self.poses.periods.clone()).unwrap_or(0.0)
+    }
+
     /// - `largest_gap_ns`: between two poses that are interpolated.
     /// - `samples`: how many came of the messages.
     pub fn findings(&self, largest_gap_ns: i64, samples: u64) -> Vec<InputFinding> {
@@ -93,7 +98,7 @@ impl InputStamps {
             }
         }
         let gap = largest_gap_ns as f64 * 1e-9;
-        let period = median(&mut self.poses.periods.clone()).unwrap_or(0.0);
+        let period = self.pose_period();
         // a pose at the stamp of the wrench needs no other
         let is_paired = 2 * samples > self.wrenches.count;
         if self.poses.count >= FEWEST && period > gap && !is_paired {

@@ -8,51 +8,13 @@
 //! motion and force between the onsets ([`CourseClock`]) speaks where they do not, and against them where they are wrong.
 
 use std::collections::VecDeque;
-use std::fmt;
 
 use nalgebra::{Vector2, Vector3};
-use serde::Serialize;
 
+use super::clock_offset::{ClockEvidence, ClockOffset};
 use super::course_clock::CourseClock;
 use super::{ContactSample, SettingError};
 use crate::numeric::{NormalEquations, direction, median};
-
-/// What the clock of the wrench reads beyond that of the pose.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ClockOffset {
-    /// s; to be added to [`super::SyncParams::wrench_offset_ns`]
-    pub offset: f64,
-    /// standard uncertainty, s
-    pub sigma: f64,
-    /// what it is estimated from
-    pub evidence: ClockEvidence,
-}
-
-/// What a delay is estimated from.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ClockEvidence {
-    /// So many onsets of contact.
-    Onsets(usize),
-    /// The course of motion and force over so many seconds of sliding or lifting.
-    Course(f64),
-}
-
-impl fmt::Display for ClockEvidence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Onsets(onsets) => write!(f, "{onsets} onsets of contact"),
-            Self::Course(seconds) => write!(f, "{seconds:.0} s of sliding and lifting"),
-        }
-    }
-}
-
-impl ClockOffset {
-    /// Whether another estimate differs by no more than the uncertainties and `slack`, s.
-    pub(super) fn agrees(&self, other: &Self, slack: f64) -> bool {
-        (self.offset - other.offset).abs() <= slack + 3.0 * self.sigma.hypot(other.sigma)
-    }
-}
 
 /// Of a stop, on each side of it, s.
 const BEFORE: f64 = 25e-3;
@@ -209,7 +171,11 @@ impl ClockEstimator {
         let scatter: f64 = profiles.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
         let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
         let offset = coarse + (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, evidence: ClockEvidence::Onsets(profiles.len()) })
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
+            offset,
+            sigma,
+            evidence: ClockEvidence::Onsets(profiles.len()),
+        })
     }
 
     /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it stops at two of them.

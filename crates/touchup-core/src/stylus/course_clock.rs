@@ -12,7 +12,8 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
-use super::{ClockEvidence, ClockOffset, ContactSample};
+use super::ContactSample;
+use super::clock_offset::{ClockEvidence, ClockOffset};
 
 /// Delays that are tried: ± [`REACH`] steps of [`STEP_NS`].
 const STEP_NS: i64 = 4_000_000;
@@ -118,9 +119,13 @@ impl DelayBlocks {
         let variance = (count - 1.0) / count * without.iter().map(|x| (x - middle).powi(2)).sum::<f64>();
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
-        // of the force nearest to a delay, and of the mean that a sensor takes over a period
+        // of the steps, and of the mean that a sensor takes over a period
         let sigma = variance.sqrt().hypot(step / 2.0).hypot(period / 2.0);
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset { offset, sigma, evidence: ClockEvidence::Course(instants as f64 * every) })
+        (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
+            offset,
+            sigma,
+            evidence: ClockEvidence::Course(instants as f64 * every),
+        })
     }
 }
 
@@ -172,7 +177,7 @@ impl CourseClock {
         while self.held.get(1).is_some_and(|second| second.stamp_ns <= oldest_ns) {
             self.held.pop_front();
         }
-        let is_covered = self.held.front().is_some_and(|first| first.stamp_ns <= oldest_ns);
+        let is_covered = self.held.len() > 1 && self.held.front().is_some_and(|first| first.stamp_ns <= oldest_ns);
         if is_covered && stamp_ns >= self.next_ns {
             self.next_ns = stamp_ns.saturating_add(EVERY_NS);
             self.add(stamp_ns - SPAN_NS);
@@ -217,16 +222,17 @@ impl CourseClock {
             .then(|| self.held.range(first..end).map(|x| x.position).sum::<Vector3<f64>>() / (end - first) as f64)
     }
 
-    /// `value` of the force nearest to each delay.
+    /// `value` of the force at each delay: between two samples it goes straight.
     fn at_delays(&self, middle_ns: i64, value: impl Fn(&Vector3<f64>) -> f64) -> OfDelays {
-        let mut nearest = 0;
+        let mut after = 1;
         std::array::from_fn(|at| {
             let wanted_ns = middle_ns + (at as i64 - REACH as i64) * STEP_NS;
-            let distance = |x: &CourseSample| (x.stamp_ns - wanted_ns).abs();
-            while self.held.get(nearest + 1).is_some_and(|next| distance(next) <= distance(&self.held[nearest])) {
-                nearest += 1;
+            while after + 1 < self.held.len() && self.held[after].stamp_ns < wanted_ns {
+                after += 1;
             }
-            value(&self.held[nearest].force_o)
+            let (one, two) = (&self.held[after - 1], &self.held[after]);
+            let share = (wanted_ns - one.stamp_ns) as f64 / (two.stamp_ns - one.stamp_ns).max(1) as f64;
+            value(&one.force_o.lerp(&two.force_o, share.clamp(0.0, 1.0)))
         })
     }
 

@@ -9,6 +9,7 @@
 
 mod bias;
 mod clock;
+mod clock_offset;
 mod compensate;
 mod contact;
 mod contact_estimator;
@@ -27,7 +28,8 @@ mod tip_motion;
 mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
-pub use clock::{ClockEstimator, ClockEvidence, ClockOffset};
+pub use clock::ClockEstimator;
+pub use clock_offset::{ClockEvidence, ClockOffset};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};

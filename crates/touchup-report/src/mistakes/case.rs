@@ -26,9 +26,7 @@ pub(super) fn run(
     let made = mistakes.iter().map(|mistake| (Some(mistake), mistake.made_of(&sound)));
     std::iter::once((None, sound.clone()))
         .chain(made)
-        .map(|(mistake, told)| {
-            Ok(CheckedRecording { world, seed, mistake, findings: findings(scene.clone(), &told)? })
-        })
+        .map(|(mistake, told)| Ok(CheckedRecording { world, seed, mistake, findings: findings(scene.clone(), &told)? }))
         .collect()
 }
 

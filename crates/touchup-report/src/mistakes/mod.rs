@@ -26,11 +26,11 @@ pub struct MistakesParams {
 }
 
 impl MistakesParams {
-    /// One seed of two worlds, or twenty of all and forty more without a mistake.
+    /// One seed of three worlds, or five of all and ten more without a mistake.
     pub fn of(effort: Effort) -> Self {
         Self {
-            worlds: SimWorld::ALL[..effort.choose(5, SimWorld::ALL.len())].to_vec(),
-            seeds: 1..=effort.choose(1, 20),
+            worlds: SimWorld::ALL[..effort.choose(3, SimWorld::ALL.len())].to_vec(),
+            seeds: 1..=effort.choose(1, 5),
             more_sound: effort.choose(0, 2),
             longest: effort.choose(20.0, 60.0),
         }

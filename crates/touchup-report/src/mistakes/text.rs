@@ -9,7 +9,12 @@ impl Mistakes {
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![self.introduction()];
         text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
-        Chapter::of("Mistakes: what is said of wrong input", text, vec![], vec![self.named(), self.sound(), self.missed()])
+        Chapter::of(
+            "Mistakes: what is said of wrong input",
+            text,
+            vec![],
+            vec![self.named(), self.sound(), self.missed()],
+        )
     }
 
     /// Those with a mistake, and those without.

@@ -4,6 +4,7 @@ mod command;
 mod cost;
 mod coverage;
 mod extremes;
+mod mistakes;
 mod page;
 mod stability;
 mod whole_scan;

@@ -44,8 +44,14 @@ const SCATTER: f64 = 0.33;
 const TURN: f64 = 0.053;
 /// Where contacts that face otherwise are near, a surface turns before the next contact by this share of the angle between …
 const TURN_SHARE: f64 = 0.45;
-/// … or of this, where the edge that they make is known.
-const TURN_SHARE_AT_EDGE: f64 = 0.06;
+/// … by twice that in a gap of so many σ to the nearest contact, growing with its square: the ball may have bridged a hole …
+const DOUBLING_GAP: f64 = 0.7;
+/// … and by no more than this.
+const TURN_SHARE_IN_GAP: f64 = 2.0;
+/// Beyond the last contact it may go on as a wall does.
+const TURN_SHARE_AT_BORDER: f64 = 1.5;
+/// Where the edge that they make is known, it turns by this share.
+const TURN_SHARE_AT_EDGE: f64 = 0.12;
 /// By this much normals differ on a plane by noise and friction alone, rad: 11°.
 const TURN_NOISE: f64 = 0.2;
 /// A surface turns by what faces otherwise up to so many σ behind the nearest contact.
@@ -95,7 +101,12 @@ impl FieldParams {
         shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));
         let [noise, tilt] = variances(shares, (window_ns as f64 / WINDOW_TO_CORRELATION) as i64);
         let nearness = |reach: f64| (1.0 - nearest_other / (reach * self.sigma)).max(0.0);
-        let share = if found.is_edge { TURN_SHARE_AT_EDGE } else { TURN_SHARE };
+        let gap = found.lateral() / (DOUBLING_GAP * self.sigma);
+        let share = match (found.is_edge, found.is_border) {
+            (true, _) => TURN_SHARE_AT_EDGE,
+            (false, true) => TURN_SHARE_AT_BORDER,
+            (false, false) => (TURN_SHARE * (1.0 + gap * gap)).min(TURN_SHARE_IN_GAP),
+        };
         let turn = (share * self.turn_around(found, store, x, near)).hypot(if found.is_border { TURN } else { 0.0 });
         let fit = FitSigma {
             noise: noise.sqrt(),
@@ -152,7 +163,7 @@ fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
 /// A vertex is off where it is not on the fit: edges and corners are put together of several pieces.
 const OFF_FIT: f64 = 1.4;
 /// A guess one radius from the nearest contact is off by this share of the radius; it grows with the square of the distance.
-const GUESS: f64 = 0.18;
+const GUESS: f64 = 0.25;
 
 /// Standard deviation of a vertex along the normal, m.
 ///
