@@ -8,7 +8,8 @@ use nalgebra::{Isometry3, Translation3};
 use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
 use touchup_core::mesh::FaceTree;
 use touchup_core::stylus::{
-    CompensatorParams, Message, StampedPose, StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Message, Placement, StampedPose,
+    StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
 };
 use touchup_fuzz::{BALL, closed_box, number, rotation, vector};
 
@@ -39,10 +40,12 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
         tip: BALL,
         shape: TipShape::Ball,
         scan_noise: number(bytes, 1e-3)?.abs().min(1.0),
-        contact_on: Some(0.5),
+        placement: Placement::default(),
+        gate: Some(ContactGateParams::default()),
         sync: params,
     };
     let mut monitor = InputMonitor::new(monitored).expect("settings in their range");
+    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(BALL)).expect("settings in their range");
     let (mut last, mut newest) = (0, None);
     let mut take = |sync: &mut Synchroniser, monitor: &mut InputMonitor| {
         while let Some(sample) = sync.next_sample() {
@@ -51,6 +54,9 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
             assert!(sample.wrench.force.iter().chain(sample.pose_ot.translation.vector.iter()).all(|x| x.is_finite()));
             assert!((sample.pose_ot.rotation.norm() - 1.0).abs() < 1e-6);
             monitor.sample(&sample);
+            if let Ok(contact) = contacts.observe(&sample) {
+                monitor.contact(contact);
+            }
         }
     };
     while !bytes.is_empty() {

@@ -180,7 +180,7 @@ impl CourseClock {
         let is_covered = self.held.len() > 1 && self.held.front().is_some_and(|first| first.stamp_ns <= oldest_ns);
         if is_covered && stamp_ns >= self.next_ns {
             self.next_ns = stamp_ns.saturating_add(EVERY_NS);
-            self.add(stamp_ns - SPAN_NS);
+            self.add(stamp_ns.saturating_sub(SPAN_NS));
         }
     }
 
@@ -200,8 +200,8 @@ impl CourseClock {
 
     /// F(t + δ) · v(t) / |F| |v|.
     fn cosines(&self, middle_ns: i64) -> Option<OfDelays> {
-        let before = self.mean_position(middle_ns - MEAN_NS, middle_ns)?;
-        let way = self.mean_position(middle_ns, middle_ns + MEAN_NS)? - before;
+        let before = self.mean_position(middle_ns.saturating_sub(MEAN_NS), middle_ns)?;
+        let way = self.mean_position(middle_ns, middle_ns.saturating_add(MEAN_NS))? - before;
         let length = way.norm();
         (length >= LEAST_SPEED * MEAN_NS as f64 * 1e-9)
             .then(|| self.at_delays(middle_ns, |force_o| force_o.dot(&way) / (force_o.norm() * length)))
@@ -210,7 +210,7 @@ impl CourseClock {
     /// F(t + δ) g(t), N m.
     fn forces_at_gap(&self, middle_ns: i64) -> Option<OfDelays> {
         let along = self.held.iter().map(|x| x.force_o).sum::<Vector3<f64>>().try_normalize(0.0)?;
-        let middle = self.mean_position(middle_ns - EVERY_NS, middle_ns + EVERY_NS)?;
+        let middle = self.mean_position(middle_ns.saturating_sub(EVERY_NS), middle_ns.saturating_add(EVERY_NS))?;
         let lowest = self.held.iter().map(|x| (x.position - middle).dot(&along)).fold(0.0, f64::min);
         Some(self.at_delays(middle_ns, |force_o| -lowest * force_o.dot(&along)))
     }
@@ -226,12 +226,13 @@ impl CourseClock {
     fn at_delays(&self, middle_ns: i64, value: impl Fn(&Vector3<f64>) -> f64) -> OfDelays {
         let mut after = 1;
         std::array::from_fn(|at| {
-            let wanted_ns = middle_ns + (at as i64 - REACH as i64) * STEP_NS;
+            let wanted_ns = middle_ns.saturating_add((at as i64 - REACH as i64) * STEP_NS);
             while after + 1 < self.held.len() && self.held[after].stamp_ns < wanted_ns {
                 after += 1;
             }
             let (one, two) = (&self.held[after - 1], &self.held[after]);
-            let share = (wanted_ns - one.stamp_ns) as f64 / (two.stamp_ns - one.stamp_ns).max(1) as f64;
+            let since = |from: i64, to: i64| to.saturating_sub(from) as f64;
+            let share = since(one.stamp_ns, wanted_ns) / since(one.stamp_ns, two.stamp_ns).max(1.0);
             value(&one.force_o.lerp(&two.force_o, share.clamp(0.0, 1.0)))
         })
     }

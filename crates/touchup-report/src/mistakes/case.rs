@@ -1,6 +1,6 @@
 //! One seed of one world: scan and recording in memory, sound and with mistakes, checked as `touchup doctor` does.
 
-use super::CheckedRecording;
+use super::checked::CheckedRecording;
 use crate::error::Measured;
 use touchup_core::diagnose::{InputFinding, InputMonitor};
 use touchup_core::mesh::FaceTree;

@@ -4,13 +4,15 @@
 //! `touchup simulate --world` writes.
 
 mod case;
+mod checked;
 mod text;
 
 use std::ops::RangeInclusive;
 
+pub use checked::{CheckedRecording, RightCount};
+
 use super::Effort;
-use touchup_core::diagnose::InputFinding;
-use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
+use touchup_sim::{INPUT_MISTAKES, SimWorld};
 
 /// What is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,34 +39,6 @@ impl MistakesParams {
     }
 }
 
-/// What was said of one recording.
-#[derive(Clone, Debug)]
-pub struct CheckedRecording {
-    /// whose it is
-    pub world: SimWorld,
-    /// of the world
-    pub seed: u64,
-    /// `None`: it is sound
-    pub mistake: Option<&'static InputMistake>,
-    /// the surest first
-    pub findings: Vec<InputFinding>,
-}
-
-impl CheckedRecording {
-    /// Whether the mistake is what is said first, and surely; of a sound recording, that nothing is said.
-    pub fn is_right(&self) -> bool {
-        match (self.mistake, self.findings.first()) {
-            (None, first) => first.is_none(),
-            (Some(mistake), first) => first.is_some_and(|first| first.is_sure && first.cause == mistake.cause),
-        }
-    }
-
-    /// What is said first; empty for nothing.
-    pub fn said(&self) -> String {
-        self.findings.first().map_or_else(String::new, |first| format!("{}: {first}", first.cause))
-    }
-}
-
 /// All recordings, with what was said of them.
 #[derive(Clone, Debug)]
 pub struct Mistakes {
@@ -74,25 +48,6 @@ pub struct Mistakes {
     pub checked: Vec<CheckedRecording>,
     /// a recording that could not be made, in words
     pub failed: Vec<String>,
-}
-
-/// How many of some recordings were judged rightly.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RightCount {
-    /// judged rightly
-    pub right: usize,
-    /// of all
-    pub all: usize,
-}
-
-impl RightCount {
-    /// Of these.
-    pub fn of<'a>(checked: impl Iterator<Item = &'a CheckedRecording>) -> Self {
-        checked.fold(Self::default(), |count, checked| Self {
-            right: count.right + usize::from(checked.is_right()),
-            all: count.all + 1,
-        })
-    }
 }
 
 /// The share of mistakes whose cause is to be named.
