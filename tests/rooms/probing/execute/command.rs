@@ -248,8 +248,7 @@ fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     assert_eq!((done.status.code(), are_there()), (Some(0), [true; 4]), "{}", stderr(&done));
 }
 
-/// The scan has closed the slot: four of five contacts are off it, and with y and z swapped more of them would be on it. That is what an arm is sent
-/// for, and no mistake.
+/// The scan has closed the slot: four of five contacts are off it. That is what an arm is sent for, and no mistake.
 #[test]
 fn what_the_scan_has_lost_is_probed_without_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -258,7 +257,6 @@ fn what_the_scan_has_lost_is_probed_without_force() {
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
     let findings = summary["refine"]["findings"].as_array().unwrap();
-    assert!(findings.iter().any(|finding| finding["cause"] == "position_axes"), "{summary}");
     assert!(findings.iter().all(|finding| finding["is_sure"] == false), "{summary}");
     assert!(folder.path().join("out/refined.ply").exists());
 }
