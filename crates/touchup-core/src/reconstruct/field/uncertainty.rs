@@ -47,11 +47,11 @@ const TURN_SHARE: f64 = 0.45;
 /// … by twice that in a gap of so many σ to the nearest contact, growing with its square: the ball may have bridged a hole …
 const DOUBLING_GAP: f64 = 0.7;
 /// … and by no more than this.
-const TURN_SHARE_IN_GAP: f64 = 2.0;
+const TURN_SHARE_IN_GAP: f64 = 1.2;
 /// Beyond the last contact it may go on as a wall does.
-const TURN_SHARE_AT_BORDER: f64 = 1.5;
+const TURN_SHARE_AT_BORDER: f64 = 0.75;
 /// Where the edge that they make is known, it turns by this share.
-const TURN_SHARE_AT_EDGE: f64 = 0.12;
+const TURN_SHARE_AT_EDGE: f64 = 0.06;
 /// By this much normals differ on a plane by noise and friction alone, rad: 11°.
 const TURN_NOISE: f64 = 0.2;
 /// A surface turns by what faces otherwise up to so many σ behind the nearest contact.
