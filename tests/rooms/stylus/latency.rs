@@ -111,18 +111,29 @@ fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends(
     }
 }
 
-/// Taps at 8 Hz by a sensor too slow for the onsets: along the shaft |sin|, and a force where it is 0.
+/// Taps by a sensor too slow for the onsets: 60 ms of contact, then up and down at 50 mm/s.
+///
+/// - `period_ms`: from tap to tap; the ball is lifted by 3.5 mm at most.
+fn taps(period_ms: i64, late_ms: i64) -> Option<ClockOffset> {
+    let phase = |ms: i64| ms.rem_euclid(period_ms) - 60;
+    let at = |ms: i64| {
+        let up = phase(ms).max(0).min(period_ms - 60 - phase(ms).max(0)).min(70);
+        sample(ms, up as f64 * 50e-6, if phase(ms - late_ms) < 0 { 2.0 } else { 0.0 })
+    };
+    offset_of((0..24_000).step_by(8).map(at))
+}
+
 #[test]
 fn where_a_slow_sensor_taps_the_gap_without_force_gives_the_delay() {
     for late_ms in [-90, -40, 0, 40, 90] {
-        let phase = |ms: i64| ms.rem_euclid(200) as f64 - 60.0;
-        let at = |ms: i64| {
-            // 60 ms of contact, then up and down again by 3.5 mm
-            let up = phase(ms).max(0.0).min(140.0 - phase(ms).max(0.0));
-            sample(ms, up * 50e-6, if phase(ms - late_ms) < 0.0 { 2.0 } else { 0.0 })
-        };
-        let found = offset_of((0..12_000).step_by(8).map(at)).unwrap();
+        let found = taps(500, late_ms).unwrap();
         assert!((found.offset * 1e3 - late_ms as f64).abs() < 4.0, "{late_ms} ms: {found:?}");
         assert!(matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 6e-3, "{found:?}");
     }
+}
+
+/// Every 200 ms alike: 90 ms late is 110 ms early.
+#[test]
+fn taps_that_repeat_themselves_within_the_span_tell_no_delay() {
+    assert_eq!(taps(200, 90), None);
 }

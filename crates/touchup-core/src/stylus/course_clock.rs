@@ -39,6 +39,10 @@ const MOST_BLOCKS: usize = 64;
 const LEAST_BLOCKS: usize = 8;
 /// What is least at the delay is this share at most of its mean over all delays: else nothing turned, or lifted.
 const LEAST_SHARE: f64 = 0.7;
+/// Another delay whose sum is lower than the mean by all but this share may be it as well: what repeats itself within the span.
+const OTHER_DEPTH: f64 = 0.1;
+/// … when it is so many steps away.
+const OTHER_STEPS: usize = 10;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 12e-3;
 /// Beyond their uncertainties, two estimates differ by less than this, s.
@@ -109,7 +113,8 @@ impl DelayBlocks {
         let total: OfDelays = std::array::from_fn(|at| parts.iter().map(|part| part[at]).sum());
         let offset = least(&total)?;
         let mean = total.iter().sum::<f64>() / DELAYS as f64;
-        if total.iter().copied().fold(f64::INFINITY, f64::min) > LEAST_SHARE * mean {
+        let lowest = total.iter().copied().fold(f64::INFINITY, f64::min);
+        if lowest > LEAST_SHARE * mean || has_another(&total, lowest + OTHER_DEPTH * (mean - lowest)) {
             return None;
         }
         let without = |part: &OfDelays| least(&std::array::from_fn(|at| total[at] - part[at]));
@@ -256,6 +261,13 @@ impl CourseClock {
             (sliding, lifting) => sliding.or(lifting),
         }
     }
+}
+
+/// Whether a sum is least at two delays apart, both below `limit`.
+fn has_another(sums: &OfDelays, limit: f64) -> bool {
+    let is_low = |at: &usize| sums[*at] < limit && sums[*at] <= sums[at - 1] && sums[*at] <= sums[at + 1];
+    let mut low = (1..DELAYS - 1).filter(is_low);
+    low.next().zip(low.last()).is_some_and(|(first, last)| last - first > OTHER_STEPS)
 }
 
 /// Where a sum is least, by the parabola through the three points around it, s; `None` at an end.
