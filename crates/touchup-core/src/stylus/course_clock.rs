@@ -267,7 +267,7 @@ impl CourseClock {
 fn has_another(sums: &OfDelays, limit: f64) -> bool {
     let is_low = |at: &usize| sums[*at] < limit && sums[*at] <= sums[at - 1] && sums[*at] <= sums[at + 1];
     let mut low = (1..DELAYS - 1).filter(is_low);
-    low.next().zip(low.last()).is_some_and(|(first, last)| last - first > OTHER_STEPS)
+    low.next().zip(low.next_back()).is_some_and(|(first, last)| last - first > OTHER_STEPS)
 }
 
 /// Where a sum is least, by the parabola through the three points around it, s; `None` at an end.
