@@ -213,7 +213,8 @@ impl InputJudge<'_> {
         if is_on_scan && is_ball {
             // a scan's own offset is within the tolerance; a radius in another unit is not a matter of tolerance
             let is_other = reported.distance > LEAST_RATIO * radius && reported.distance > 3.0 * error;
-            if radius < LEAST_BALL || is_other {
+            // a tip of radius 0 is a point
+            if (radius > 0.0 && radius < LEAST_BALL) || is_other {
                 return Some(off_by_radius());
             }
         }
