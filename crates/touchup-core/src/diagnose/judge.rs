@@ -10,7 +10,7 @@ use super::monitor_params::InputMonitorParams;
 use super::places::{ALIKE, BallFit, ScanScale, extent_of};
 use super::shift::{ContactShift, best_shift};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::numeric::NormalEquations;
+use crate::numeric::{NormalEquations, jackknife_variance};
 use crate::stylus::{ClockOffset, TipParams, TipShape, WrenchFrame};
 
 /// Fewer presses say nothing.
@@ -166,10 +166,10 @@ impl InputJudge<'_> {
             let remedy = "the forces look like kN: give the wrench in N";
             findings.push(InputFinding::new(InputCause::ForceUnit, true, measured, remedy));
         } else if largest > LARGEST_PRESS || largest > HARD_PRESS && bend > LARGEST_BEND {
-            let measured = format!(
-                "the stylus presses with {largest:.0} N, above a noise of {noise:.2} N, and would bend by {:.1} mm",
-                bend * 1e3
-            );
+            let mut measured = format!("the stylus presses with {largest:.0} N, above a noise of {noise:.2} N");
+            if bend > 0.0 {
+                measured += &format!(", and would bend by {:.1} mm", bend * 1e3);
+            }
             let remedy = "the forces look like grams or mN: give the wrench in N";
             findings.push(InputFinding::new(InputCause::ForceUnit, true, measured, remedy));
         } else if largest < on {
@@ -387,9 +387,7 @@ impl InputJudge<'_> {
         };
         let found = compliance(None)?;
         let without: Vec<f64> = (0..stretches.len()).map(|at| compliance(Some(at))).collect::<Option<_>>()?;
-        let count = without.len() as f64;
-        let mean = without.iter().sum::<f64>() / count;
-        let sigma = ((count - 1.0) / count * without.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt();
+        let sigma = jackknife_variance(&without).sqrt();
         let told = self.params.tip.stiffness.map_or(0.0, f64::recip);
         let off = (told - found).abs();
         let is_doubted = off > 4.0 * sigma + OTHER_COMPLIANCE * told.max(found) && off * levels.largest > LEAST_SUNK;

@@ -4,6 +4,7 @@
 mod basis;
 mod counted;
 mod direction;
+mod jackknife;
 mod least_squares;
 mod moments;
 mod point_grid;
@@ -18,6 +19,7 @@ pub(crate) use basis::tangent_basis;
 pub use basis::turned_to;
 pub use counted::counted;
 pub(crate) use direction::{direction, length_and_direction};
+pub(crate) use jackknife::jackknife_variance;
 pub(crate) use least_squares::{DampedSearch, NormalEquations, SearchEnd};
 pub(crate) use moments::{centroid_and_spread, mean, scatter, spreads};
 pub(crate) use point_grid::PointGrid;

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::clock_offset::{ClockEvidence, ClockOffset};
+use super::clock_offset::{ClockEvidence, ClockOffset, mean_period};
 use super::course_clock::CourseClock;
 use super::{ContactSample, SettingError};
 use crate::numeric::{NormalEquations, direction, median};
@@ -53,8 +53,6 @@ const LEAST_ONSETS: usize = 8;
 /// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
 /// the wrench is added: over which part of it a sensor takes its mean is unknown.
 const SHAPE: f64 = 0.3e-3;
-/// Beyond their uncertainties, the delays by onsets and by the course differ by less than this, s.
-const AGREED: f64 = 4e-3;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 3e-3;
 
@@ -122,7 +120,7 @@ impl ClockEstimator {
                 self.onsets.pop_front();
             }
             self.onsets.push_back(onset);
-            self.period = self.mean_period();
+            self.period = mean_period(self.held.iter().map(|x| x.stamp_ns));
         }
         if was_in_contact != is_in_contact {
             let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns.saturating_sub(turned_ns) >= CALM_NS);
@@ -138,7 +136,7 @@ impl ClockEstimator {
     pub fn offset(&self) -> Option<ClockOffset> {
         let (onsets, course) = (self.by_onsets(), self.course.offset());
         match (onsets, course) {
-            (Some(onsets), Some(course)) if !onsets.agrees(&course, AGREED) => Some(course),
+            (Some(onsets), Some(course)) if !onsets.agrees(&course) => Some(course),
             (onsets, course) => onsets.or(course),
         }
     }
@@ -194,13 +192,6 @@ impl ClockEstimator {
         let second = (0..SEARCHED_STEPS).filter(|step| step.abs_diff(best) > apart).map(|step| stops[step]);
         let is_alone = second.fold(0.0, f64::max) <= SECOND_STOP * stops[best];
         (is_alone && stops[best] >= LEAST_STOP).then(|| at_step(best))
-    }
-
-    /// Between the samples that are held, s.
-    fn mean_period(&self) -> f64 {
-        let ends = self.held.front().zip(self.held.back());
-        let span = ends.map_or(0.0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns) as f64 * 1e-9);
-        span / (self.held.len().max(2) - 1) as f64
     }
 
     /// `None` when the samples around the onset do not show one.

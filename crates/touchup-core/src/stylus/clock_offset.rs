@@ -34,9 +34,19 @@ impl fmt::Display for ClockEvidence {
     }
 }
 
+/// Beyond their uncertainties, two estimates of one delay differ by less than this, s.
+const AGREED: f64 = 4e-3;
+
 impl ClockOffset {
-    /// Whether another estimate differs by no more than the uncertainties and `slack`, s.
-    pub(super) fn agrees(&self, other: &Self, slack: f64) -> bool {
-        (self.offset - other.offset).abs() <= slack + 3.0 * self.sigma.hypot(other.sigma)
+    /// Whether another estimate may be of the same delay.
+    pub(super) fn agrees(&self, other: &Self) -> bool {
+        (self.offset - other.offset).abs() <= AGREED + 3.0 * self.sigma.hypot(other.sigma)
     }
+}
+
+/// Mean time between samples of these stamps, in order, s; 0 for fewer than two.
+pub(super) fn mean_period(mut stamps_ns: impl DoubleEndedIterator<Item = i64> + ExactSizeIterator) -> f64 {
+    let steps = stamps_ns.len().max(2) - 1;
+    let ends = stamps_ns.next().zip(stamps_ns.next_back());
+    ends.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9) / steps as f64
 }

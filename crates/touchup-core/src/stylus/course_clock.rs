@@ -13,7 +13,8 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 
 use super::ContactSample;
-use super::clock_offset::{ClockEvidence, ClockOffset};
+use super::clock_offset::{ClockEvidence, ClockOffset, mean_period};
+use crate::numeric::jackknife_variance;
 
 /// Delays that are tried: ± [`REACH`] steps of [`STEP_NS`].
 const STEP_NS: i64 = 4_000_000;
@@ -45,8 +46,6 @@ const OTHER_DEPTH: f64 = 0.1;
 const OTHER_STEPS: usize = 10;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 12e-3;
-/// Beyond their uncertainties, two estimates differ by less than this, s.
-const AGREED: f64 = 4e-3;
 
 /// One number for each delay.
 type OfDelays = [f64; DELAYS];
@@ -119,13 +118,10 @@ impl DelayBlocks {
         }
         let without = |part: &OfDelays| least(&std::array::from_fn(|at| total[at] - part[at]));
         let without: Vec<f64> = parts.iter().map(without).collect::<Option<_>>()?;
-        let count = without.len() as f64;
-        let middle = without.iter().sum::<f64>() / count;
-        let variance = (count - 1.0) / count * without.iter().map(|x| (x - middle).powi(2)).sum::<f64>();
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
         // of the steps, and of the mean that a sensor takes over a period
-        let sigma = variance.sqrt().hypot(step / 2.0).hypot(period / 2.0);
+        let sigma = jackknife_variance(&without).sqrt().hypot(step / 2.0).hypot(period / 2.0);
         (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
             offset,
             sigma,
@@ -208,8 +204,9 @@ impl CourseClock {
         let before = self.mean_position(middle_ns.saturating_sub(MEAN_NS), middle_ns)?;
         let way = self.mean_position(middle_ns, middle_ns.saturating_add(MEAN_NS))? - before;
         let length = way.norm();
-        (length >= LEAST_SPEED * MEAN_NS as f64 * 1e-9)
-            .then(|| self.at_delays(middle_ns, |force_o| force_o.dot(&way) / (force_o.norm() * length)))
+        (length >= LEAST_SPEED * MEAN_NS as f64 * 1e-9).then(|| {
+            self.at_delays(middle_ns, |force_o| force_o.dot(&way) / (force_o.norm() * length).max(f64::MIN_POSITIVE))
+        })
     }
 
     /// F(t + δ) g(t), N m.
@@ -242,21 +239,14 @@ impl CourseClock {
         })
     }
 
-    /// Between the samples that are held, s.
-    fn period(&self) -> f64 {
-        let ends = self.held.front().zip(self.held.back());
-        let span = ends.map_or(0.0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns) as f64 * 1e-9);
-        span / (self.held.len().max(2) - 1) as f64
-    }
-
     /// The delay; `None` where neither sliding nor lifting determines it, or the two differ.
     pub fn offset(&self) -> Option<ClockOffset> {
-        let period = self.period();
+        let period = mean_period(self.held.iter().map(|x| x.stamp_ns));
         let lifting = self.lifting.offset(period, |block| block.sums);
         match (self.sliding.offset(period, DelayBlock::scatter), lifting) {
             (Some(sliding), Some(lifting)) => {
                 let surer = if sliding.sigma <= lifting.sigma { sliding } else { lifting };
-                sliding.agrees(&lifting, AGREED).then_some(surer)
+                sliding.agrees(&lifting).then_some(surer)
             }
             (sliding, lifting) => sliding.or(lifting),
         }

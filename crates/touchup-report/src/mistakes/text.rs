@@ -80,6 +80,6 @@ impl Mistakes {
             .column("seed", |checked| checked.seed as usize)
             .column("mistake", |checked| checked.mistake.map_or("none", |mistake| mistake.name))
             .column("said", CheckedRecording::said)
-            .caption("")
+            .caption("What is said first; nothing where that is empty.")
     }
 }

@@ -257,6 +257,7 @@ fn what_the_scan_has_lost_is_probed_without_force() {
     assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
     let summary: Value = serde_json::from_slice(&done.stdout).unwrap();
     let findings = summary["refine"]["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|finding| finding["cause"] == "frame"), "{summary}");
     assert!(findings.iter().all(|finding| finding["is_sure"] == false), "{summary}");
     assert!(folder.path().join("out/refined.ply").exists());
 }
