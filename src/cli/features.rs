@@ -150,7 +150,7 @@ const NOTABLE: f64 = 0.05;
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
     let count = features.iter().filter(|feature| feature.kind == kind).count();
-    let ending = if kind == Kind::Boss { "es" } else { "s" };
+    let ending = if matches!(kind, Kind::Boss | Kind::Notch) { "es" } else { "s" };
     (count > 0).then(|| counted(count, kind.name(), &format!("{}{ending}", kind.name())))
 }
 

@@ -3,25 +3,31 @@
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use nalgebra::{Unit, Vector3};
 use tracing::warn;
 
 use super::progress::WorkProgress;
 use super::simulated_world::{OffFactor, world_named, write_told_scene, write_truth};
 use super::{CliError, Losses, check_kept, not_written, print_result, require};
-use crate::io::atomic::create_folder;
+use crate::io::atomic::{create_folder, write_atomically};
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::sim::{
-    CameraParams, DrawnWorld, Habit, MeshSurface, PathParams, ScannerParams, SimWorld, Stroke, StylusParams, Surface,
-    Touch, plan_mesh, scan, see_markers, touch,
+    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimWorld, Stroke, StylusParams,
+    Surface, Touch, plan_sides, scan, see_markers, touch,
 };
 use crate::stylus::{MarkerFrame, Message};
 
 /// File of the true part, in the output folder.
 const TRUTH_NAME: &str = "truth.ply";
+/// File of the true contacts, in the output folder: of every so many ticks of 1 ms.
+const CONTACTS_NAME: &str = "truth_contacts.csv";
+const CONTACT_EVERY: usize = 10;
+const CONTACTS_HEAD: &str = "t_s,centre_x_mm,centre_y_mm,centre_z_mm,contact_x_mm,contact_y_mm,contact_z_mm\n";
 /// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part and take for ever.
 const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 /// Frame of the poses in the recordings.
@@ -68,9 +74,46 @@ pub(super) struct SimulateArguments {
     /// Noise of the scan along its normals, mm [default: 0.6, or as the world draws it]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     scan_noise_mm: Option<f64>,
+    /// How good the scanner is [default: cheap, or as the world draws it]
+    #[arg(long, value_enum)]
+    scanner: Option<ScannerKind>,
+    /// Sides of the part from which the hand reaches it, by the axis that points there: z,x,-y
+    #[arg(long, value_name = "AXES", value_delimiter = ',', default_value = "z", allow_hyphen_values = true)]
+    sides: Vec<Side>,
     /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic /stylus/markers
     #[arg(long)]
     markers: bool,
+}
+
+/// How good a scanner is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ScannerKind {
+    /// hand-held: noisy, rounded, holes closed over
+    Cheap,
+    /// stationary: fine and exact, without the floors of deep holes
+    Good,
+}
+
+/// A side of the part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Side {
+    /// towards the hand, in O
+    towards: Unit<Vector3<f64>>,
+}
+
+impl FromStr for Side {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (sign, axis) = text.strip_prefix('-').map_or((1.0, text), |axis| (-1.0, axis));
+        let axis = match axis {
+            "x" => Vector3::x(),
+            "y" => Vector3::y(),
+            "z" => Vector3::z(),
+            _ => return Err(format!("{text} is no side: give x, -x, y, -y, z or -z")),
+        };
+        Ok(Self { towards: Unit::new_unchecked(axis * sign) })
+    }
 }
 
 /// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
@@ -88,8 +131,16 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     let surface = MeshSurface::new(&truth)?;
     let off = OffFactor::joined(&arguments.told_off)?;
     let mut drawn = arguments.world.map(|world| world.draw_told_off(arguments.seed, &off)).transpose()?;
-    let usual = || (ScannerParams { seed: arguments.seed, ..ScannerParams::default() }, StylusParams::default());
+    let usual = || (ScannerParams::default(), StylusParams::default());
     let (mut scanner, mut stylus) = drawn.as_ref().map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
+    if let Some(kind) = arguments.scanner {
+        scanner = if kind == ScannerKind::Good { ScannerParams::good() } else { ScannerParams::default() };
+        if let Some(drawn) = &mut drawn {
+            drawn.set_truth("scan_edge", scanner.edge);
+            drawn.set_truth("scan_noise", scanner.noise);
+        }
+    }
+    scanner.seed = arguments.seed;
     for (given, unit, name, place) in [
         (arguments.tip_radius_mm, 1e-3, "tip_radius", &mut stylus.radius),
         (arguments.stiffness_n_per_mm, 1e3, "stiffness", &mut stylus.stiffness),
@@ -105,8 +156,11 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     }
     let camera = arguments.markers.then(CameraParams::default);
     let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
-    let path = plan_mesh(&surface, &surface.bounds(), &scanner.view, &hand)?;
-    let path = drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit).led(path);
+    let habit = drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit);
+    let sides: Vec<_> = arguments.sides.iter().map(|side| side.towards).collect();
+    let stage = WorkProgress::stage("strokes");
+    let path = plan_sides(&surface, &sides, habit, &hand)?;
+    drop(stage);
     let out = &arguments.out;
     let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &stylus, camera.as_ref(), out)?;
     if let Some(drawn) = &drawn {
@@ -155,7 +209,25 @@ pub(super) fn write_simulation(
     }
     write_recording(&folder.join("touch.mcap"), &topics, OBJECT_FRAME, STYLUS_FRAME, merged(&touch.messages, frames))
         .map_err(CliError::not_written)?;
+    write_contacts(&touch.moments, &folder.join(CONTACTS_NAME))?;
     Ok(Simulated { scan, touch })
+}
+
+/// Writes where the ball really was and really touched: a line for each contact, mm, in O.
+fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
+    let touched = moments.iter().step_by(CONTACT_EVERY).filter(|moment| !moment.contacts.is_empty());
+    let lines = touched.flat_map(|moment| {
+        let centre = moment.pose_ot.translation.vector * 1e3;
+        moment.contacts.iter().map(move |contact| {
+            let p = contact.point.coords * 1e3;
+            format!(
+                "{:.3},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4}\n",
+                moment.t, centre.x, centre.y, centre.z, p.x, p.y, p.z
+            )
+        })
+    });
+    let text: String = std::iter::once(CONTACTS_HEAD.to_owned()).chain(lines).collect();
+    write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes())).map_err(not_written(path))
 }
 
 /// Each frame of markers in front of the first message that is later.

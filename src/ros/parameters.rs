@@ -108,7 +108,8 @@ pub struct ParameterDescriptor {
 }
 
 /// Names of the kinds of features by their numbers in messages.
-pub const KIND_NAMES: [&str; 8] = ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane"];
+pub const KIND_NAMES: [&str; 10] =
+    ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch"];
 
 /// All parameters of the node, those of docs/ros.md and the one that every node has.
 pub const PARAMETERS: &[ParameterDescriptor] = {

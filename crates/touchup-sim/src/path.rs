@@ -91,13 +91,14 @@ const ROOM: f64 = 0.5e-3;
 const CHORD: f64 = 0.2e-3;
 
 impl RasterRegion {
-    fn at(&self, q: Point2<f64>, z: f64) -> Point3<f64> {
+    /// A point of V in O.
+    pub(super) fn at(&self, q: Point2<f64>, z: f64) -> Point3<f64> {
         self.frame_ov * Point3::new(q.x, q.y, z)
     }
 }
 
 /// A free move from wherever the ball is.
-fn free(points: Vec<Point3<f64>>) -> Stroke {
+pub(super) fn free(points: Vec<Point3<f64>>) -> Stroke {
     Stroke { points, speed: FREE_SPEED, press: None }
 }
 
@@ -223,13 +224,8 @@ pub fn plan_mesh(
     params: &PathParams,
 ) -> Result<Vec<Stroke>, SimError> {
     params.check()?;
-    let frame_ov = looking_along(view, bounds);
-    let seen = bounds.seen_from(&frame_ov);
-    let clear = seen.max.z + params.radius + CLEARANCE;
-    let overrun = Vector2::repeat(OVERRUN * params.radius);
-    let (low, high, floor) = (seen.min.xy() - overrun, seen.max.xy() + overrun, seen.min.z + params.radius);
-    let region = RasterRegion { frame_ov, low, high, floor, clear };
-    let size = high - low;
+    let region = region_over(bounds, view, params.radius);
+    let size = region.high - region.low;
     let needed = 2.0 * size.x * size.y / (params.speed * params.longest);
     let params = PathParams { pitch: params.pitch.max(needed), ..*params };
     let mut strokes = raster(&region, Lines::AlongX, &params)?;
@@ -238,6 +234,20 @@ pub fn plan_mesh(
         stroke.points = follow_heights(surface, &region, &stroke.points, &params);
     }
     Ok(strokes)
+}
+
+/// A region over all of a box, seen along `view` (in O), and as far beyond it as a ball of `radius` (m) needs.
+pub(super) fn region_over(bounds: &Bounds, view: &Unit<Vector3<f64>>, radius: f64) -> RasterRegion {
+    let frame_ov = looking_along(view, bounds);
+    let seen = bounds.seen_from(&frame_ov);
+    let overrun = Vector2::repeat(OVERRUN * radius);
+    RasterRegion {
+        frame_ov,
+        low: seen.min.xy() - overrun,
+        high: seen.max.xy() + overrun,
+        floor: seen.min.z + radius,
+        clear: seen.max.z + radius + CLEARANCE,
+    }
 }
 
 /// The line in short pieces, as deep as a ball that comes from above goes at each of its points, and a little deeper.
@@ -262,7 +272,7 @@ fn follow_heights(
 }
 
 /// z in V at which a ball coming down at (x, y) first touches; `None` when it passes the floor.
-fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Point2<f64>, radius: f64) -> Option<f64> {
+pub(super) fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Point2<f64>, radius: f64) -> Option<f64> {
     let mut z = region.clear;
     while z > region.floor {
         // the distance says how far the ball can go without touching

@@ -54,6 +54,10 @@ settings! {
             not_negative("the rigid turn", *rigid_turn, "rad"), not_negative("the size of the bias", bias.abs(), "m");
         /// Direction in which the scanner looks, in O.
         view: Unit<Vector3<f64>> = -Vector3::z_axis();
+        /// Angle between the two lines of sight that a triangulation needs, rad: what only one of them reaches, such as the floor of a deep
+        /// hole, is missing. 0: one line is enough.
+        baseline: f64 = 0.0, not_negative("the angle between the lines of sight", *baseline, "rad"),
+            up_to("the angle between the lines of sight", *baseline, "rad", 1.0, "1 rad or less");
         /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
         open_back: bool = true;
         /// Of all randomness.
@@ -76,6 +80,10 @@ const COARSE: f64 = 0.1;
 /// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
 /// stand along the view are: the scanner is moved about.
 const SEEN: f64 = -0.35;
+/// So often the scanner is turned about the view …
+const SIGHT_TURNS: usize = 12;
+/// … and leaned aside by these angles, rad.
+const SIGHT_LEANS: [f64; 3] = [0.0, 0.35, 0.7];
 /// Patches of fewer faces are removed where isolated: seen ones are dirt, unseen ones in between are filled in.
 const FEWEST_FACES: usize = 30;
 
@@ -85,6 +93,22 @@ const REPAIRS: usize = 2;
 const LONGEST_FILLED: usize = 20;
 
 impl ScannerParams {
+    /// A stationary scanner with striped light: fine and exact, but it sees no floor of a deep hole.
+    pub fn good() -> Self {
+        Self {
+            edge: 0.8e-3,
+            noise: 0.04e-3,
+            noise_correlation: 1.5e-3,
+            bias: 0.02e-3,
+            rounding: 0.2e-3,
+            closes_holes_below: 2e-3,
+            rigid_shift: 0.05e-3,
+            rigid_turn: 0.03f64.to_radians(),
+            baseline: 25f64.to_radians(),
+            ..Self::default()
+        }
+    }
+
     /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise and the gradient stay within.
     fn band(&self) -> f64 {
         3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
@@ -113,7 +137,9 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
         let normal = field.gradient(p).try_normalize(0.0).unwrap_or_else(Vector3::z);
         *p += normal * (gauss(&mut rng) * params.noise * params.white_share.sqrt());
     }
-    soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners));
+    let sight = sight_pairs(params.baseline);
+    let is_lit = |corners: &_| sight.is_empty() || is_triangulated(&field, corners, &sight);
+    soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners) && is_lit(corners));
     soup.drop_crossings_mut()?;
     soup.tidy_mut();
     for _ in 0..params.missing {
@@ -232,6 +258,33 @@ impl Waves {
             }
         }
     }
+}
+
+/// Pairs of lines of sight, each `baseline` (rad) apart, as unit vectors in V towards the scanner: it is turned about the view and leaned
+/// aside as it is moved.
+fn sight_pairs(baseline: f64) -> Vec<[Vector3<f64>; 2]> {
+    if baseline == 0.0 {
+        return Vec::new();
+    }
+    let towards = |lean: f64, about: f64| {
+        Rotation3::from_axis_angle(&Vector3::z_axis(), about) * Vector3::new(lean.sin(), 0.0, lean.cos())
+    };
+    let pair = |lean: f64, about: f64| [lean - baseline / 2.0, lean + baseline / 2.0].map(|lean| towards(lean, about));
+    let abouts = (0..SIGHT_TURNS).map(|i| std::f64::consts::TAU * i as f64 / SIGHT_TURNS as f64);
+    abouts.flat_map(|about| SIGHT_LEANS.map(|lean| pair(lean, about))).collect()
+}
+
+/// Whether both lines of a pair reach a face.
+fn is_triangulated(field: &Field, [a, b, c]: &[Point3<f64>; 3], pairs: &[[Vector3<f64>; 2]]) -> bool {
+    let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
+    let start = middle + normal * (2.0 * field.pitch);
+    let top = field.node(field.nodes.map(|n| n - 1)).z;
+    let reaches = |sight: &Vector3<f64>| {
+        let steps = ((top - start.z) / (field.pitch * sight.z)).max(0.0) as usize;
+        normal.dot(sight) > 0.0 && (0..steps).all(|i| field.at(&(start + sight * (i as f64 * field.pitch))) > 0.0)
+    };
+    pairs.iter().any(|pair| pair.iter().all(reaches))
 }
 
 /// Whether a face looks towards the scanner and nothing occludes it.

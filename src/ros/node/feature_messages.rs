@@ -31,6 +31,8 @@ pub fn number_of(kind: Option<Kind>) -> u8 {
         Some(Kind::Edge) => FeatureMsg::KIND_EDGE,
         Some(Kind::Corner) => FeatureMsg::KIND_CORNER,
         Some(Kind::Plane) => FeatureMsg::KIND_PLANE,
+        Some(Kind::Cylinder) => FeatureMsg::KIND_CYLINDER,
+        Some(Kind::Notch) => FeatureMsg::KIND_NOTCH,
     }
 }
 

@@ -1,11 +1,12 @@
 //! Mistakes made of sound recordings, and the cause that is named.
 
 use crate::full::is_full;
+use nalgebra::Vector3;
 use touchup::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
 use touchup::mesh::FaceTree;
 use touchup::sim::{
-    INPUT_MISTAKES, InputMistake, PathParams, Plate, ScannerParams, SensorParams, StylusParams, ToldRecording,
-    plan_demo, scan, touch,
+    Habit, INPUT_MISTAKES, InputMistake, PathParams, Plate, ScannerParams, SensorParams, StylusParams, ToldRecording,
+    plan_demo, plan_sides, scan, touch,
 };
 use touchup::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, Placement, SyncParams, Synchroniser, TipParams,
@@ -81,6 +82,22 @@ fn sound_input_raises_no_alarm_and_each_mistake_is_named() {
 }
 
 /// A ball as wide as the holes of the plate (seeds 2, 6, 10, …) rests on their rims: there neither its free motion nor its stop is clear.
+// The plate's scan is open below, and a hand that reaches it from its sides touches mostly where the scan has ended: beyond a rim a signed
+// distance says nothing.
+#[test]
+fn a_part_touched_on_all_sides_of_an_open_scan_raises_no_alarm() {
+    let plate = Plate::default();
+    let hand = PathParams { radius: 3e-3, longest: 20.0, ..PathParams::default() };
+    let sides = [Vector3::x_axis(), -Vector3::x_axis(), Vector3::y_axis(), -Vector3::y_axis()];
+    let path = plan_sides(&plate, &sides, Habit::Slide, &hand).unwrap();
+    let stylus = StylusParams { radius: hand.radius, ..StylusParams::default() };
+    let messages = touch(&plate, &path, &stylus, 4).unwrap().messages;
+    let scan = scan(&plate, &ScannerParams { seed: 4, ..ScannerParams::default() }).unwrap();
+    let tip = TipParams { radius: hand.radius, stiffness: Some(stylus.stiffness) };
+    let found = findings(&ToldRecording { scan, messages, tip });
+    assert!(found.iter().all(|finding| !finding.is_sure), "{found:?}");
+}
+
 #[test]
 fn over_twenty_seeds_nine_of_ten_mistakes_are_named() {
     if !is_full() {

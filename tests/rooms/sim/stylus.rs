@@ -2,8 +2,8 @@
 
 use super::*;
 use touchup::sim::{
-    Lines, Moment, PathParams, RasterRegion, SensorParams, Stroke, StylusParams, Touch, plan_demo, plan_mesh,
-    push_ball, raster, touch,
+    Habit, Lines, Moment, PathParams, RasterRegion, SensorParams, Stroke, StylusParams, Touch, TruthShape, plan_demo,
+    plan_mesh, plan_sides, plan_waterlines, push_ball, raster, touch,
 };
 use touchup::stylus::{Message, StampedPose, StampedWrench};
 
@@ -274,5 +274,60 @@ fn ball_slides_over_any_mesh_from_any_side() {
         // the hand comes from where it looks from, and so does the force
         let towards = touched.moments.iter().map(|m| m.force_o).sum::<Vector3<f64>>().normalize();
         assert!(towards.dot(&view) < -0.8, "{towards}");
+    }
+}
+
+// The ball's centre runs where the wall is a radius less the lean away: at R − (r − lean) of the axis of a hole of radius R.
+#[test]
+fn waterlines_go_around_every_hole_that_lets_the_ball_in() {
+    let plate = Plate::default();
+    let hand = PathParams::default();
+    let runs = plan_waterlines(&plate, &plate.bounds(), &-Vector3::z_axis(), &hand).unwrap();
+    let top = plate.bounds().max.z;
+    let features = plate.features();
+    let holes: Vec<_> = features
+        .iter()
+        .filter_map(|feature| match feature.shape {
+            TruthShape::Hole { diameter, .. } => Some((feature.centre.xy(), diameter / 2.0)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(holes.len(), 2);
+    for (centre, radius) in holes {
+        let away = radius - hand.radius + hand.lean;
+        let is_in = |p: &Point3<f64>| p.z < top && (p.xy() - centre).norm() < radius;
+        let of_hole: Vec<&Stroke> =
+            runs.iter().filter(|run| run.points.len() > 9 && run.points.iter().all(is_in)).collect();
+        assert!(of_hole.len() > 1, "{} runs at different heights", of_hole.len());
+        for run in &of_hole {
+            let off = run.points.iter().map(|p| ((p.xy() - centre).norm() - away).abs()).fold(0.0, f64::max);
+            // the chords of the grid that the line was drawn on
+            assert!(off < 0.06e-3, "{off}");
+        }
+        let turns =
+            of_hole[0].points.iter().map(|p| (p.xy() - centre).y.atan2((p.xy() - centre).x).to_degrees() as i32 / 30);
+        assert!(turns.collect::<std::collections::BTreeSet<_>>().len() >= 11, "all around");
+    }
+    let time: f64 = runs.iter().filter(|run| run.points.len() > 9).map(seconds).sum();
+    assert!(time <= hand.longest, "{time} s");
+}
+
+fn seconds(run: &Stroke) -> f64 {
+    run.points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum::<f64>() / run.speed
+}
+
+#[test]
+fn from_several_sides_the_ball_never_goes_through_the_part() {
+    let plate = Plate::default();
+    let hand = PathParams { longest: 15.0, ..PathParams::default() };
+    let sides = [Vector3::z_axis(), -Vector3::z_axis(), Vector3::y_axis()];
+    let path = plan_sides(&plate, &sides, Habit::Slide, &hand).unwrap();
+    let free = path.iter().filter(|stroke| stroke.press.is_none() && stroke.points.len() == 3);
+    let farthest = |stroke: &Stroke| stroke.points.iter().map(|p| plate.signed_distance(p)).fold(f64::MAX, f64::min);
+    assert_eq!(free.clone().count(), 2, "between the sides");
+    assert!(free.map(farthest).all(|gap| gap > hand.radius), "and around the part");
+    // each side is pressed from
+    for side in sides {
+        assert!(path.iter().any(|stroke| stroke.press.is_some_and(|press| (*press + *side).norm() < 1e-9)));
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::mesh::{FaceTree, TriMesh};
+use crate::mesh::{FaceTree, TriMesh, is_on_rim};
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
 
 /// A noisy scan is this much off at most, m: a wider tolerance would hide a wrong unit.
@@ -77,11 +77,12 @@ pub(super) fn extent_of(points: impl Iterator<Item = Point3<f64>>) -> f64 {
 /// How a set of ball centres lies on the scan.
 #[derive(Clone, Debug)]
 pub(super) struct BallFit {
-    /// median signed distance of the centre from the surface, m
+    /// median signed distance of the centre from the surface, m, of those that the scan says something of: neither below it, where it has
+    /// a lid over a hole, nor beyond its rims, where it has no inside
     pub distance: f64,
     /// median deviation from that, m
     pub scatter: f64,
-    /// share within the tolerance, of those that are not below the surface: there the scan has a lid over a hole
+    /// share of them within the tolerance
     pub share: f64,
     /// of each centre, m
     pub distances: Vec<f64>,
@@ -92,8 +93,9 @@ pub(super) struct BallFit {
 /// Touches that follow each other share the same error of the scan: so many count as one.
 pub(super) const ALIKE: f64 = 10.0;
 
-/// No more than this share of the contacts is under lids of the scan.
+/// No more than this share of the contacts is under lids of the scan, and no more beyond its rims.
 const MOST_UNDER_LIDS: f64 = 0.6;
+const MOST_BEYOND_RIMS: f64 = 0.8;
 
 impl BallFit {
     /// Standard uncertainty of the median distance of `count` centres, m.
@@ -108,23 +110,29 @@ impl BallFit {
         radius: f64,
         tolerance: f64,
     ) -> Self {
-        let mut distances = Vec::new();
-        let mut normals = Vec::new();
+        let (mut distances, mut normals, mut is_beyond) = (Vec::new(), Vec::new(), Vec::new());
         for centre in centres {
             let Some(hit) = tree.closest(scan, &centre, f64::INFINITY) else { continue };
             let off = centre - hit.point;
             let normal = scan.normal(hit.face);
             distances.push(off.norm().copysign(off.dot(&normal)));
             normals.push(normal);
+            is_beyond.push(is_on_rim(scan, &hit));
         }
-        let within = distances.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
-        let below = distances.iter().filter(|&&distance| distance < -tolerance).count();
-        let is_lid = below as f64 <= MOST_UNDER_LIDS * distances.len() as f64;
-        let count = distances.len() - if is_lid { below } else { 0 };
-        let share = within as f64 / count.max(1) as f64;
-        let distance = median(&mut distances.clone()).unwrap_or(f64::INFINITY);
-        let mut scatters: Vec<f64> = distances.iter().map(|x| (x - distance).abs()).collect();
-        let scatter = median(&mut scatters).unwrap_or(f64::INFINITY);
+        let mut told = distances.clone();
+        let beyond = is_beyond.iter().filter(|is| **is).count();
+        if beyond as f64 <= MOST_BEYOND_RIMS * distances.len() as f64 {
+            told = distances.iter().zip(&is_beyond).filter(|(_, is)| !**is).map(|(&distance, _)| distance).collect();
+        }
+        let below = told.iter().filter(|&&distance| distance < -tolerance).count();
+        if below as f64 <= MOST_UNDER_LIDS * told.len() as f64 {
+            told.retain(|&distance| distance >= -tolerance);
+        }
+        let within = told.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
+        let share = within as f64 / told.len().max(1) as f64;
+        let distance = median(&mut told).unwrap_or(f64::INFINITY);
+        told.iter_mut().for_each(|x| *x = (*x - distance).abs());
+        let scatter = median(&mut told).unwrap_or(f64::INFINITY);
         Self { distance, scatter, share, distances, normals }
     }
 

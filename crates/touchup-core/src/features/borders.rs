@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use nalgebra::Point3;
 
 use super::facets::NONE;
-use super::fit::{Plane, Surface};
+use super::fit::Plane;
+use super::primitive::Primitive;
 use super::scene::Parted;
 use crate::numeric::distinct;
 
@@ -119,7 +120,7 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
             _ => joint.push(piece),
         }
     }
-    let is_convex = is_convex(parted, border, [one, other]);
+    let is_convex = is_convex(parted, border, planes);
     joint
         .into_iter()
         .filter(|[a, b]| b - a > SHORTEST * parted.diagonal)
@@ -127,12 +128,13 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
         .collect()
 }
 
-/// Whether each of two planes falls away from the other where they meet.
-pub(super) fn is_convex(parted: &Parted, border: &[Border], planes: [&Plane; 2]) -> bool {
+/// Whether each of two segments falls away from the other where they meet.
+pub(super) fn is_convex(parted: &Parted, border: &[Border], numbers: [usize; 2]) -> bool {
+    let surfaces = numbers.map(|number| &parted.segment(number).primitive);
     let height =
-        |face: u32, plane: &Plane| parted.facets.triangle(face).map(|x| plane.distance(&x)).iter().sum::<f64>();
+        |face: u32, surface: &Primitive| parted.facets.triangle(face).map(|x| surface.distance(&x)).iter().sum::<f64>();
     let along = |border: &Border| (border.ends[1] - border.ends[0]).norm();
-    let above = |b: &Border| (height(b.faces[1], planes[0]) + height(b.faces[0], planes[1])) * along(b);
+    let above = |b: &Border| (height(b.faces[1], surfaces[0]) + height(b.faces[0], surfaces[1])) * along(b);
     border.iter().map(above).sum::<f64>() < 0.0
 }
 

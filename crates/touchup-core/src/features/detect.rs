@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
+use super::contact_walls::add_contact_walls;
 use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
 use super::fit::{Ends, Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
@@ -39,12 +40,13 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let mut parted = Parted::of(mesh, tree);
     let beside: Vec<_> = borders(&parted, &without_seams(&parted)).into_keys().collect();
     parted.segmentation.join_planes(&parted.facets, beside.into_iter());
+    add_contact_walls(&mut parted, touches);
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
     let holes = holes(&parted, &walls);
-    let (slots, pockets) = slots(&parted, &of_face, &borders);
+    let (slots, pockets) = slots(&parted, &walls, &of_face, &borders);
     let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| is_sure_plane(&parted, number));
     let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(is_sure).collect();
     let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
@@ -57,9 +59,18 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
-    features.extend(slots.iter().map(|slot| slot_feature(&measure, slot, Kind::Slot)));
+    let is_told = |slot: &Slot, feature: &Feature| {
+        // of a measured mesh what is open all around may be a gap between its pieces
+        let is_shut = slot.floor.is_some() || slot.ends.iter().all(Option::is_some);
+        is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
+    };
+    let told = slots.iter().map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
+    features.extend(told.filter(|(slot, feature)| is_told(slot, feature)).map(|(_, feature)| feature));
     features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
-    features.extend(bosses(&parted, &walls).iter().map(|boss| boss_feature(&measure, &walls, boss)));
+    let bosses = bosses(&parted, &walls);
+    features.extend(bosses.iter().map(|boss| boss_feature(&measure, &walls, boss)));
+    let is_shaft = |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
+    features.extend((0..walls.len()).filter(is_shaft).map(|at| cylinder_feature(&measure, &walls[at])));
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
     let is_large = |number: usize| parted.segment(number).area > LEAST_PLANE * parted.diagonal * parted.diagonal;
@@ -69,6 +80,16 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let all: f64 = parted.facets.areas.iter().sum();
     let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
     Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
+}
+
+/// A cylinder is worth telling when it covers more than this share of a turn: less is the rounding of an edge.
+const ROUNDED_EDGE: f64 = 0.3;
+
+/// Whether a wall has the material inside and is large enough to be told of.
+fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
+    let area: f64 = wall.segments.iter().map(|&number| parted.segment(number).area).sum();
+    let is_large = area > LEAST_PLANE * parted.diagonal * parted.diagonal;
+    is_large && !wall.is_concave && !wall.is_cone() && wall.coverage > ROUNDED_EDGE
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
@@ -122,8 +143,11 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
     }
     let side = (to.place.value - from.place.value).dot(out).signum();
     let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
-    let of_wall = fitted.touches.iter().map(|&number| along(&measure.observed.touch(number).point));
-    let (lowest, highest) = of_wall.fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+    // the ball is as high as its contact, or as its measured normal leans: whatever is less far
+    let of_wall = fitted.touches.iter().map(|&number| measure.observed.touch(number));
+    let of_wall = of_wall.map(|touch| [along(&touch.centre), along(&touch.point)]);
+    let (lowest, highest) =
+        of_wall.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| (low.min(a.max(b)), high.max(a.min(b))));
     let begin = if is_felt[0] { 0.0 } else { lowest };
     let end = if is_felt[1] { along(&to.place.value) } else { highest };
     Measured {
@@ -135,13 +159,23 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
 }
 
 impl AxisEnd {
-    /// Where the axis meets plane number `plane`; else `point`.
-    fn on(measure: &Measure, plane: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
-        let met = plane.and_then(|number| measure.plane(number)).and_then(|fitted| {
+    /// Where the axis leaves plane or cylinder number `land`; else `point`.
+    fn on(measure: &Measure, land: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
+        let on_plane = |number: usize| {
+            let fitted = measure.plane(number)?;
             let place = fitted.met(point, axis)?;
             let own_std = fitted.confirmed().and_then(|fit| fit.own_std_at(&place.value));
+            Some((place, own_std))
+        };
+        let on_shaft = |number: usize| {
+            let fitted = measure.shaft(number)?;
+            let place = fitted.met(point, axis)?;
+            let own_std = fitted.confirmed().and_then(|fit| fit.own_std_at(&place.value));
+            Some((place, own_std))
+        };
+        let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number))).map(|(place, own_std)| {
             let [common, shift] = measure.observed.systematic(&place.touches);
-            Some(Self { place, own_std, systematic: common.hypot(shift) })
+            Self { place, own_std, systematic: common.hypot(shift) }
         });
         met.unwrap_or_else(|| Self { place: Measured { value: *point, ..Measured::default() }, ..Self::default() })
     }
@@ -155,6 +189,9 @@ impl AxisEnd {
     }
 }
 
+/// What was touched over this share of a turn is round.
+const WHOLE_TURN: f64 = 0.8;
+
 fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let wall = &walls[hole.wall];
     let fitted = measure.cylinder(wall, hole.rim);
@@ -166,6 +203,8 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.place.touches.is_empty();
     let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.place.value));
     let touched = measure.observed.touched_share(&wall.segments);
+    // where the mesh has a gap the touches may go all around
+    let is_notch = hole.is_notch && measure.turn(&fitted.touches, wall) < WHOLE_TURN;
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
@@ -174,7 +213,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         through: hole.through.filter(|_| is_known),
         walls: Some(Walls::Round(fitted.surface)),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
-        ..Feature::new(Kind::Hole, centre, touched, fitted.to)
+        ..Feature::new(if is_notch { Kind::Notch } else { Kind::Hole }, centre, touched, fitted.to)
     }
 }
 
@@ -216,7 +255,26 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(fitted.surface)),
-        ..Feature::new(Kind::Boss, centre, measure.observed.touched_share(&wall.segments), fitted.to)
+        ..Feature::new(
+            if boss.is_turned { Kind::Cylinder } else { Kind::Boss },
+            centre,
+            measure.observed.touched_share(&wall.segments),
+            fitted.to,
+        )
+    }
+}
+
+fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
+    let fitted = measure.cylinder(wall, None);
+    let middle = fitted.surface.nearest_on_axis(&wall.at(wall.middle()));
+    let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&middle));
+    let centre = Measured { value: middle, std, touches: fitted.touches.clone(), ..Measured::default() };
+    Feature {
+        diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
+        length: Some(Measured { value: wall.height(), ..Measured::default() }),
+        axis: Some(fitted.axis(&wall.axis)),
+        walls: Some(Walls::Round(fitted.surface)),
+        ..Feature::new(Kind::Cylinder, centre, measure.observed.touched_share(&wall.segments), fitted.to)
     }
 }
 

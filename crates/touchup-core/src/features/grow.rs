@@ -492,10 +492,14 @@ impl MeshScale {
         ROUNDING * self.diagonal
     }
 
+    /// How far facets of a drawing are off a round surface where they have corners on its chords, m.
+    pub(super) fn chords(&self) -> f64 {
+        WAVES_OF_ALL * self.diagonal
+    }
+
     /// What the facets of a drawing need that were divided further.
     fn divided(&self) -> (f64, f64) {
-        let closeness = WAVES_OF_ALL * self.diagonal;
-        (closeness, WIDER * closeness)
+        (self.chords(), WIDER * self.chords())
     }
 
     /// What surfaces that are good but no drawing need.

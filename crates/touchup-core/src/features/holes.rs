@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::rays::RayHit;
 use super::scene::Parted;
 use super::walls::Wall;
 use crate::mesh::{BoxQuery, FaceId};
@@ -20,8 +21,10 @@ pub(super) struct Hole {
     pub depth: f64,
     /// `None`: what closes it is neither a floor nor the tip of a drill, or the mesh ends there
     pub through: Option<bool>,
-    /// number of the plane around the opening
+    /// number of the plane, or of the cylinder with the material inside, around the opening
     pub rim: Option<usize>,
+    /// whether it is open to the side along all of its wall: a cut at the rim of the part
+    pub is_notch: bool,
     /// number of the plane that is its floor
     pub floor: Option<usize>,
     /// number of the wall that is its countersink
@@ -41,12 +44,16 @@ pub(super) struct Boss {
     /// numbers of the planes
     pub base: usize,
     pub top: Option<usize>,
+    /// whether its base is the shoulder of a shaft
+    pub is_turned: bool,
 }
 
 /// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still counts.
 const HOLE_COVERAGE: f64 = 0.6;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
+/// A shaft goes around its shoulder by at least this share of what stands on it.
+const SHAFT_COVERAGE: f64 = 0.8;
 /// Faces cover at least this share of what a wall is between its ends.
 const FILLED: f64 = 0.4;
 /// A wall is a fragment of another when it is so much smaller …
@@ -57,10 +64,11 @@ const REST: f64 = 0.3;
 const STRAIGHT: f64 = 0.9945;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
 const LEAST_HEIGHT: f64 = 0.08;
-/// So much of the radius around the axis is free in a hole.
+/// So much of the radius around the axis is free in a hole, and so much beyond the wall a line to it goes.
 const FREE: f64 = 0.5;
-/// Points of the axis that are examined.
-const PROBES: usize = 7;
+/// Points of the axis from which lines to the wall are examined, and lines from each.
+const PROBES: usize = 5;
+const PROBE_RAYS: usize = 8;
 /// What closes a hole is no farther from the end of its wall than this many radii.
 const CLOSED: f64 = 1.0;
 /// Where no plane is around an end and something is met within this many radii, the wall may go on to there unseen.
@@ -70,7 +78,7 @@ const ASIDE: f64 = 0.05;
 /// Rings around an opening, in its radii: the land beside a hole may be narrow.
 const RINGS: [f64; 3] = [1.06, 1.15, 1.3];
 /// Those around a foot that was scanned or touched: a ball does not reach into its corner.
-const FOOT_RINGS: [f64; 3] = [1.2, 1.35, 1.5];
+const FOOT_RINGS: [f64; 4] = [1.2, 1.35, 1.5, 1.8];
 /// A plane around an opening is within this many radii of the end of the wall.
 const NEAR_END: f64 = 0.4;
 /// Share of the rings that a plane has to have.
@@ -81,6 +89,10 @@ const SQUARE: f64 = 0.94;
 const TORN: [f64; 2] = [0.5, 1.5];
 /// Directions in which an end is examined.
 const AROUND: usize = 24;
+/// A notch is open over so many of these directions: 45° …
+const NOTCH: usize = 3;
+/// … as far as this many radii from the axis.
+const OPEN: f64 = 3.0;
 /// Walls of one hole are no farther apart along the axis than this many radii.
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
@@ -99,7 +111,7 @@ struct WallEnd {
     closed_at: Option<f64>,
     /// whether nothing closes it, or may do so farther away
     is_open: bool,
-    /// the plane around it and its share of the ring
+    /// what is around it and its share of the ring
     rim: Option<(usize, f64)>,
 }
 
@@ -152,20 +164,28 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         [true, true] => usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0])),
     };
     let (open, other) = (ends[open], ends[1 - open]);
-    let on_plane = |end: &WallEnd| {
+    let middle = wall.middle();
+    let on_land = |end: &WallEnd| {
         let (number, _) = end.rim?;
-        let t = parted.plane(number)?.along(&wall.origin, &wall.axis)?;
+        let t = middle + parted.exit(number, &wall.at(middle), &(wall.axis * end.out))? * end.out;
         ((t - end.t).abs() < NEAR_END * radius).then_some((number, t))
     };
-    let rim = on_plane(&open);
+    let rim = on_land(&open);
+    let is_notch = is_notch(parted, wall, &open);
+    if is_notch && rim.is_none() {
+        return None;
+    }
     let top = rim.map_or(open.t, |(_, t)| t);
     let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
     // at the tip of a drill the depth is that of the cylinder
     let closed_at = other.closed_at.filter(|_| tip.is_none());
-    let floor = closed_at.and_then(|t| floor_at(parted, wall, t));
+    let floor = match shoulder(parted, walls, at, &other) {
+        Some(shoulder) => Some((shoulder, other.t)),
+        None => closed_at.and_then(|t| Some((floor_at(parted, wall, t)?, t))),
+    };
     let bottom = match other.closed_at {
-        Some(t) => floor.map_or(other.t, |_| t),
-        None => on_plane(&other).map_or(other.t, |(_, t)| t),
+        Some(_) => floor.map_or(other.t, |(_, t)| t),
+        None => floor.map(|(_, t)| t).or_else(|| Some(on_land(&other)?.1)).unwrap_or(other.t),
     };
     Some(Hole {
         wall: at,
@@ -177,20 +197,65 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
             Some(_) => (floor.is_some() || tip.is_some()).then_some(false),
         },
         rim: rim.map(|(number, _)| number),
-        floor,
+        floor: floor.map(|(number, _)| number),
+        is_notch,
         countersink: cone_beside(walls, at, &open).filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
     })
 }
 
-/// Whether there is nothing around the axis.
-fn is_free(parted: &Parted, wall: &Wall) -> bool {
+/// The plane at which a hole gets narrower, where another goes on behind it.
+fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
+    let wall = &walls[at];
+    let is_next = |next: &&Wall| {
+        let is_near = next.gap(wall).abs() < SAME_HOLE * wall.radius();
+        !next.is_cone() && next.coverage >= HOLE_COVERAGE && next.radius() < wall.radius() && is_near
+    };
+    let next = walls.iter().filter(|next| end.goes_on_in(wall, next)).find(is_next)?;
+    let ring = [(wall.radius() + next.radius()) / 2.0];
+    let (middle, opening) = (wall.at(end.t), wall.axis * -end.out);
     let around = parted.around(wall.segments[0]);
-    let free = (1..PROBES).filter(|&i| {
-        let p = wall.at(wall.ends[0] + wall.height() * i as f64 / PROBES as f64);
-        around.closest(&p, FREE * wall.radius()).is_none()
-    });
+    parted.plane_around(&around, &middle, &opening, &ring, NEAR_END * wall.radius()).map(|(number, _)| number)
+}
+
+/// Whether a wall is a cut at the rim of the part: beside where it is open neither a wall nor what is around the opening goes on.
+fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
+    let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
+    let [e, g] = tangent_basis(&wall.axis);
+    let mut rays = around.rays(radius);
+    let mut is_open = |i: usize| {
+        let (sine, cosine) = (std::f64::consts::TAU * (i as f64 + 0.3) / AROUND as f64).sin_cos();
+        let along = e * cosine + g * sine;
+        let is_beside = around.closest(&(wall.at(end.t) + along * (RINGS[1] * radius)), NEAR_END * radius).is_some();
+        [!is_beside, rays.first(&wall.at(wall.middle()), &along, OPEN * radius).is_none()]
+    };
+    let open: Vec<[bool; 2]> = (0..AROUND).map(&mut is_open).collect();
+    let widest = |which: usize| {
+        let run = |start: usize| (0..AROUND).take_while(|i| open[(start + i) % AROUND][which]).count();
+        (0..AROUND).map(run).max().unwrap_or(0)
+    };
+    widest(0) > 0 && widest(1) >= NOTCH
+}
+
+/// Whether most lines from the axis to the wall meet nothing on the way. What closes the hole, however shallow it is, is not asked.
+fn is_free(parted: &Parted, wall: &Wall) -> bool {
+    let radius = wall.radius();
+    let [e, g] = tangent_basis(&wall.axis);
+    let mut rays = parted.around(wall.segments[0]).rays(radius);
+    let mut free = 0;
+    for i in 0..PROBES {
+        let start = wall.at(wall.ends[0] + wall.height() * (i as f64 + 0.5) / PROBES as f64);
+        for k in 0..PROBE_RAYS {
+            let (sine, cosine) = (std::f64::consts::TAU * (k as f64 + 0.3) / PROBE_RAYS as f64).sin_cos();
+            let along = e * cosine + g * sine;
+            let met = rays.first(&start, &along, (1.0 + FREE) * radius);
+            // what is met from behind is material around the axis
+            let is_free =
+                |met: RayHit| met.distance > FREE * radius && parted.facets.normal(met.face.0).dot(&along) < 0.0;
+            free += usize::from(met.is_none_or(is_free));
+        }
+    }
     // a lid that the scanner saw, or a chip, may close a part of it
-    2 * free.count() >= PROBES
+    2 * free >= PROBES * PROBE_RAYS
 }
 
 fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
@@ -199,7 +264,7 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     let middle = wall.middle();
     let around = parted.around(wall.segments[0]);
     let rings = RINGS.map(|ring| ring * radius);
-    let rim = parted.plane_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = parted.land_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
     let rim = rim.filter(|&(_, share)| share > RIM);
     let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
     // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
@@ -284,20 +349,34 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
     group
 }
 
-/// All round bosses: walls with material inside whose foot is a plane.
+/// All round bosses, and steps of shafts: walls with material inside whose foot is a plane.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
     let is_boss = |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
     (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
 }
 
+/// Whether a wall is what carries the shoulder on which another stands at `foot`, `out` being ±1 times its axis.
+fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
+    let is_round = !wider.is_concave && wider.coverage >= SHAFT_COVERAGE * wall.coverage;
+    let is_round = is_round && wider.radius() > wall.radius();
+    let beyond = (wider.at(wider.middle()) - wall.at(foot)).dot(&wall.axis) * out;
+    is_round && wider.is_coaxial(wall, SAME_AXIS) && beyond < 0.0 && wider.gap(wall) < SAME_HOLE * wall.radius()
+}
+
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
-    let rings = if parted.rounding.is_some() { RINGS } else { FOOT_RINGS }.map(|ring| ring * radius);
+    let rings = if parted.rounding.is_some() { &RINGS[..] } else { &FOOT_RINGS[..] };
+    let rings: Vec<f64> = rings.iter().map(|ring| ring * radius).collect();
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let direction = wall.axis * out;
-        let (base, share) = parted.plane_around(&around, &wall.at(foot), &direction, &rings, NEAR_END * radius)?;
+        let base = |rings: &[f64]| parted.plane_around(&around, &wall.at(foot), &direction, rings, NEAR_END * radius);
+        let (base, share) = match parted.rounding {
+            Some(_) => base(&rings)?,
+            // the corner at the foot may be as wide as the ball
+            None => rings.iter().filter_map(|&ring| base(&[ring])).max_by(|a, b| a.1.total_cmp(&b.1))?,
+        };
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
@@ -307,6 +386,8 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         let lid = lid.map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
-        (height > 0.0).then(|| Boss { wall: at, foot: wall.at(foot), out: direction, height, base, top: lid })
+        let is_turned = walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out));
+        let foot = wall.at(foot);
+        (height > 0.0).then(|| Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
     })
 }

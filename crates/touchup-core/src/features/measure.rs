@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::feature::{FittedTo, Measured};
 use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
 use super::observe::Observed;
+use super::primitive::Primitive;
 use super::slots::Slot;
 use super::walls::Wall;
 use crate::numeric::{order_statistic, spreads, tangent_basis};
@@ -47,6 +48,8 @@ const BESIDE: f64 = 0.15;
 const OVER_END: f64 = 0.3;
 /// … and its normal leans towards it by more than this, rad: 15°.
 const OVER_END_LEAN: f64 = 0.26;
+/// Leans that are tried in turn, sines: 6°, 9°, 12°.
+const LEANS: [f64; 3] = [0.1, 0.15, 0.2];
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 
@@ -70,11 +73,24 @@ impl<'a> Measure<'a> {
         }
         let guess = self.observed.parted.plane(number)?;
         let touches = self.observed.touches_of(&[number]);
-        let is_enough = touches.len() >= LEAST_TOUCHES && self.spread(&touches, &guess.point()) > LEAST_TURN;
-        let touches = if is_enough { touches } else { Vec::new() };
+        let is_enough =
+            |touches: &[u32]| touches.len() >= LEAST_TOUCHES && self.spread(touches, &guess.point()) > LEAST_TURN;
+        let touches = self.squarest(
+            touches,
+            |touch| (1.0 - touch.normal.dot(&guess.normal()).powi(2)).max(0.0).sqrt(),
+            is_enough,
+        );
         let fitted = self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None);
         self.planes.borrow_mut().insert(number, fitted.clone());
         Some(fitted)
+    }
+
+    /// The cylinder of a segment; `None` where it is none.
+    pub fn shaft(&self, number: usize) -> Option<Fitted<Cylinder>> {
+        let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else { return None };
+        let touches = self.observed.touches_of(&[number]);
+        let touches = if touches.len() < LEAST_TOUCHES { Vec::new() } else { touches };
+        Some(self.fitted(&guess, touches, &self.observed.of_mesh(&[number]), None))
     }
 
     /// The cylinder of a wall.
@@ -103,10 +119,31 @@ impl<'a> Measure<'a> {
     fn touches_around(&self, wall: &Wall) -> Vec<u32> {
         let mut touches = self.observed.touches_of(&wall.segments);
         touches.retain(|&number| !is_over_end(self.observed.touch(number), wall));
-        if touches.len() < LEAST_TOUCHES || self.turn(&touches, wall) < LEAST_TURN {
-            touches.clear();
+        let is_enough = |touches: &[u32]| touches.len() >= LEAST_TOUCHES && self.turn(touches, wall) >= LEAST_TURN;
+        if wall.is_cone() {
+            return if is_enough(&touches) { touches } else { Vec::new() };
         }
-        touches
+        self.squarest(touches, |touch| touch.normal.dot(&wall.axis).abs(), is_enough)
+    }
+
+    /// The touches whose normals lean least off that of their surface, where they are enough; none where all are not. A ball that rolls over
+    /// an edge leans more and more, and its centre comes nearer to the surface than its radius.
+    ///
+    /// - `lean`: sine of the angle between the normal of a touch and the normals of the surface.
+    fn squarest(
+        &self,
+        touches: Vec<u32>,
+        lean: impl Fn(&ProbedPoint) -> f64,
+        is_enough: impl Fn(&[u32]) -> bool,
+    ) -> Vec<u32> {
+        for most in LEANS {
+            let is_square = |&number: &u32| lean(self.observed.touch(number)) < most;
+            let square: Vec<u32> = touches.iter().copied().filter(is_square).collect();
+            if is_enough(&square) {
+                return square;
+            }
+        }
+        if is_enough(&touches) { touches } else { Vec::new() }
     }
 
     /// The walls of a slot or pocket.
@@ -121,26 +158,25 @@ impl<'a> Measure<'a> {
             let (half_length, half_width) = (slot.length / 2.0, slot.width / 2.0);
             if is_wall { q.x.abs() < half_length + room.min(0.0) } else { q.y.abs() < half_width + room }
         };
-        let of_part = |segments: Vec<usize>, is_wall: bool| {
-            let mut touches = self.observed.touches_of(&segments);
-            touches.retain(|&number| is_of(&self.observed.touch(number).point, is_wall));
-            let mut of_mesh = if segments.is_empty() { Vec::new() } else { self.observed.of_mesh(&segments) };
+        let of_part = |segments: &[usize], is_wall: bool| {
+            let mut of_mesh = if segments.is_empty() { Vec::new() } else { self.observed.of_mesh(segments) };
             of_mesh.retain(|observation| is_of(&observation.point, is_wall));
-            (touches, of_mesh)
+            of_mesh
         };
-        let (mut touches, mut of_mesh) = of_part(slot.walls.to_vec(), true);
-        let (touches_of_ends, mesh_of_ends) = of_part(slot.ends.into_iter().flatten().collect(), false);
-        let is_enough = |wall: &usize| {
-            let of_wall = self.observed.touches_of(&[*wall]);
-            of_wall.iter().filter(|&number| touches.binary_search(number).is_ok()).count() >= LEAST_TOUCHES / 2
+        let ends_of: Vec<usize> = slot.ends.into_iter().flatten().collect();
+        let of_mesh = [of_part(&slot.walls, true), of_part(&ends_of, false)].concat();
+        let is_deep =
+            |p: &Point3<f64>| (0.0..slot.depth + BESIDE * slot.width).contains(&(slot.centre - p).dot(&slot.out));
+        let touches = self.observed.touches_on(&guess, is_deep);
+        let on_wall = |touches: &[u32], side: f64| {
+            let is_there = |number: &&u32| {
+                let q = guess.pose_of.inverse_transform_point(&self.observed.touch(**number).point);
+                q.y * side > 0.25 * slot.width && is_of(&self.observed.touch(**number).point, true)
+            };
+            touches.iter().filter(is_there).count()
         };
-        if slot.walls.iter().all(is_enough) {
-            touches.extend(touches_of_ends);
-            touches.sort_unstable();
-        } else {
-            touches.clear();
-        }
-        of_mesh.extend(mesh_of_ends);
+        let is_enough = |touches: &[u32]| [1.0, -1.0].iter().all(|&side| on_wall(touches, side) >= LEAST_TOUCHES / 2);
+        let touches = self.squarest(touches, |touch| touch.normal.dot(&slot.out).abs(), is_enough);
         self.fitted(&guess, touches, &of_mesh, Some(DRILLED))
     }
 
@@ -170,7 +206,7 @@ impl<'a> Measure<'a> {
     }
 
     /// Share of a turn around a wall that touches cover.
-    fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
+    pub fn turn(&self, touches: &[u32], wall: &Wall) -> f64 {
         let [e, g] = tangent_basis(&wall.axis);
         let mut parts = [false; PARTS];
         for &number in touches {
@@ -201,6 +237,15 @@ impl Fitted<Plane> {
     /// Where a line meets the plane, m; its uncertainty is along the normal.
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
         let value = from + direction * self.surface.along(from, direction)?;
+        let std = self.confirmed().and_then(|fit| fit.std_at(&value));
+        Some(Measured { value, std, touches: self.touches.clone(), ..Measured::default() })
+    }
+}
+
+impl Fitted<Cylinder> {
+    /// Where a line leaves the cylinder, m; its uncertainty is along the normal there.
+    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
+        let value = from + direction * self.surface.exit(from, direction)?;
         let std = self.confirmed().and_then(|fit| fit.std_at(&value));
         Some(Measured { value, std, touches: self.touches.clone(), ..Measured::default() })
     }

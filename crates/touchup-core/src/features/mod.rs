@@ -8,6 +8,7 @@ mod bodies;
 mod borders;
 pub mod clusters;
 mod cones;
+mod contact_walls;
 mod creases;
 pub mod curvature;
 mod detect;

@@ -96,6 +96,19 @@ impl<'a> Observed<'a> {
         touches
     }
 
+    /// Numbers of the touches on a surface, in ascending order.
+    ///
+    /// - `is_of`: whether a point of the surface is of the part that is meant.
+    pub fn touches_on(&self, surface: &impl Surface, is_of: impl Fn(&Point3<f64>) -> bool) -> Vec<u32> {
+        let is_on = |touch: &ProbedPoint| {
+            let (distance, normal) = surface.distance_and_normal(&touch.centre);
+            let is_near = (distance - touch.radius).abs() < NEAR_RADII * self.reach;
+            is_near && normal.dot(&touch.normal) > ALIKE && is_of(&touch.point)
+        };
+        let numbers = (0..).zip(self.touches).filter(|(_, touch)| !touch.is_rejected && is_on(touch));
+        numbers.map(|(number, _)| number).collect()
+    }
+
     /// Observations of touches for a fit.
     pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
         let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);

@@ -8,6 +8,7 @@ use super::bodies::{Bodies, Surroundings};
 use super::facets::{Facets, NONE};
 use super::fit::Plane;
 use super::grow::MeshScale;
+use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::tangent_basis;
@@ -37,7 +38,8 @@ impl<'a> Parted<'a> {
     pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {
         let facets = Facets::of(mesh);
         let scale = MeshScale::of(&facets);
-        let segmentation = Segmentation::of(&facets, scale);
+        let mut segmentation = Segmentation::of(&facets, scale);
+        segmentation.join_chords(&facets, scale.chords());
         let bodies = Bodies::of(&facets);
         let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
         let rounding = exact.min_by(f64::total_cmp);
@@ -75,6 +77,40 @@ impl<'a> Parted<'a> {
         (number != NONE).then_some(number as usize)
     }
 
+    /// How far along the unit vector `direction` from `from` a segment's surface is left, m; `None` where it is not met, and for cones.
+    pub fn exit(&self, number: usize, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        match &self.segment(number).primitive {
+            Primitive::Plane(plane) => plane.along(from, direction),
+            Primitive::Cylinder(cylinder) => cylinder.exit(from, direction),
+            Primitive::Cone(_) => None,
+        }
+    }
+
+    /// Whether a segment is a cylinder with the material inside.
+    pub fn is_shaft(&self, number: usize) -> bool {
+        matches!(self.segment(number).primitive, Primitive::Cylinder(cylinder) if !cylinder.concave)
+    }
+
+    /// The plane, or the cylinder with the material inside, that most of some rings lie on which faces along `direction`, and its share of
+    /// them.
+    ///
+    /// - as [`Self::plane_around`]
+    pub fn land_around(
+        &self,
+        around: &Surroundings,
+        middle: &Point3<f64>,
+        direction: &Vector3<f64>,
+        radii: &[f64],
+        reach: f64,
+    ) -> Option<(usize, f64)> {
+        let is_land = |number: usize| {
+            let primitive = &self.segment(number).primitive;
+            let is_alike = primitive.distance_and_normal(middle).1.dot(direction) > SQUARE;
+            is_alike && (primitive.plane().is_some() || self.is_shaft(number))
+        };
+        self.surface_around(around, middle, direction, radii, reach, is_land)
+    }
+
     /// The plane that most of some rings lie on which faces along `direction`, and its share of them.
     ///
     /// - `middle`, `radii`: of the rings, square to `direction`, m
@@ -87,13 +123,26 @@ impl<'a> Parted<'a> {
         radii: &[f64],
         reach: f64,
     ) -> Option<(usize, f64)> {
+        let is_along = |number: usize| self.plane(number).is_some_and(|plane| plane.normal().dot(direction) >= SQUARE);
+        self.surface_around(around, middle, direction, radii, reach, is_along)
+    }
+
+    fn surface_around(
+        &self,
+        around: &Surroundings,
+        middle: &Point3<f64>,
+        direction: &Vector3<f64>,
+        radii: &[f64],
+        reach: f64,
+        is_land: impl Fn(usize) -> bool,
+    ) -> Option<(usize, f64)> {
         let [e, g] = tangent_basis(direction);
         let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let p = middle + (e * cosine + g * sine) * *radius;
             let Some(number) = self.segment_at(around, &p, reach) else { continue };
-            if self.plane(number).is_none_or(|plane| plane.normal().dot(direction) < SQUARE) {
+            if !is_land(number) {
                 continue;
             }
             *votes.entry(number).or_default() += 1;

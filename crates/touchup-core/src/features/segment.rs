@@ -1,7 +1,10 @@
 //! A mesh parted into pieces that one surface each explains.
 
+use std::collections::BTreeSet;
+
 use super::facets::{Facets, NONE};
 use super::fit::Surface;
+use super::grow::belongs;
 use super::marks::sort;
 use super::primitive::{Primitive, plane_of};
 use crate::numeric::{DisjointSets, distinct};
@@ -48,6 +51,59 @@ impl Segmentation {
         }
         self.segments.push(segment);
         number as usize
+    }
+
+    /// Lets each round surface of a drawing take the pieces beside it that lie on its chords as a whole: a tessellation puts corners there
+    /// where a neighbour needs one, and its facets may then look like planes of their own.
+    ///
+    /// - `tolerance`: how far chords are off the surface, m.
+    pub(super) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {
+        for number in 0..self.segments.len() {
+            let Segment { primitive, is_exact: true, .. } = self.segments[number] else { continue };
+            if primitive.plane().is_some() {
+                continue;
+            }
+            let is_on = |&face: &u32| belongs(facets, face, &primitive, tolerance);
+            let mut front = self.segments[number].faces.clone();
+            let mut examined = BTreeSet::from([number as u32]);
+            while !front.is_empty() {
+                let mut taken = Vec::new();
+                for other in front.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other) {
+                    let label = self.of_face[other as usize];
+                    if label == NONE {
+                        if is_on(&other) {
+                            self.of_face[other as usize] = number as u32;
+                            taken.push(other);
+                        }
+                        continue;
+                    }
+                    let is_smaller = self.segments[label as usize].area < self.segments[number].area;
+                    if is_smaller && examined.insert(label) && self.segments[label as usize].faces.iter().all(is_on) {
+                        let piece = &mut self.segments[label as usize];
+                        piece.area = 0.0;
+                        for face in std::mem::take(&mut piece.faces) {
+                            self.of_face[face as usize] = number as u32;
+                            taken.push(face);
+                        }
+                    }
+                }
+                let whole = &mut self.segments[number];
+                whole.area += facets.area_of(&taken);
+                whole.faces.extend(&taken);
+                front = taken;
+            }
+            self.segments[number].faces.sort_unstable();
+        }
+        self.drop_empty();
+    }
+
+    /// Drops segments without faces.
+    fn drop_empty(&mut self) {
+        self.segments.retain(|segment| !segment.faces.is_empty());
+        self.segments.sort_by(|a, b| b.area.total_cmp(&a.area));
+        for (number, segment) in self.segments.iter().enumerate() {
+            segment.faces.iter().for_each(|&face| self.of_face[face as usize] = number as u32);
+        }
     }
 
     /// Merges planes that continue each other.

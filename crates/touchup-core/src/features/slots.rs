@@ -10,6 +10,7 @@ use super::fit::{Plane, Surface};
 use super::primitive::Primitive;
 use super::rays::RayHit;
 use super::scene::Parted;
+use super::walls::Wall;
 use crate::numeric::{mean, without_repeats};
 
 /// A void between two walls that face each other.
@@ -34,7 +35,7 @@ pub(super) struct Slot {
     pub through: bool,
     /// number of the plane that is its floor
     pub floor: Option<usize>,
-    /// number of the plane around the opening
+    /// number of the plane, or of the cylinder with the material inside, around the opening
     pub land: usize,
     /// whether both ends are closed by planes, so that it is no slot unless it is long
     pub is_boxed: bool,
@@ -52,12 +53,21 @@ const SQUARE: f64 = 0.15;
 const SAMPLES: usize = 60;
 /// Share of the smaller wall that faces the other.
 const LEAST_SHARE: f64 = 0.2;
+/// A half-round end covers these shares of a turn, and is this much on its side of the slot (cosine).
+const END_TURN: std::ops::Range<f64> = 0.42..0.75;
+const AWAY: f64 = 0.7;
+/// Axes of both ends are parallel within 12°: short, they hardly have one.
+const ENDS_PARALLEL: f64 = 0.978;
+/// A slot is seen between two ends when they are no farther apart than this many widths.
+const LONGEST: f64 = 8.0;
+/// A ring around an end is this much wider.
+const RINGS: f64 = 1.15;
 /// A slot is longer than this many widths; when its ends are flat, longer than that many.
 const LONG: f64 = 1.2;
 const LONG_BOX: f64 = 2.0;
-/// A slot is not wider than this many depths.
+/// A slot that is open at an end or has no floor is not wider than this many depths.
 const WIDE: f64 = 3.0;
-/// A pocket is not wider than this many depths: shallower is a step that an uneven surface has too.
+/// A pocket or a closed slot is not wider than this many depths: shallower is a step that an uneven surface has too.
 const SHALLOW: f64 = 12.0;
 /// A pocket is at least as long as wide, but for what the sides of a square one differ by.
 const SQUARISH: f64 = 0.95;
@@ -83,7 +93,7 @@ const MOST_MET: usize = 8;
 /// All slots, and all pockets.
 ///
 /// - `of_face`: the segment of each face, seams included.
-pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec<Slot>, Vec<Slot>) {
+pub(super) fn slots(parted: &Parted, walls: &[Wall], of_face: &[u32], borders: &Borders) -> (Vec<Slot>, Vec<Slot>) {
     let planes: Vec<_> = parted.planes().filter(|&(number, ..)| parted.is_strong(number)).collect();
     let (mut slots, mut pockets): (Vec<Slot>, Vec<Slot>) = (Vec::new(), Vec::new());
     let mut views = BTreeMap::new();
@@ -95,14 +105,110 @@ pub(super) fn slots(parted: &Parted, of_face: &[u32], borders: &Borders) -> (Vec
             }
             let Some((slot, share)) = between(parted, of_face, borders, &mut views, [i, j]) else { continue };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
-            if is_slot && !slot.is_aslant && slot.width < WIDE * slot.depth {
+            let is_shut = slot.floor.is_some() && slot.ends.iter().all(Option::is_some);
+            let widest = if is_shut { SHALLOW } else { WIDE };
+            if is_slot && !slot.is_aslant && slot.width < widest * slot.depth {
                 slots.push(slot);
             } else if !is_slot && share > POCKET_SHARE && is_pocket(&slot) {
                 pockets.push(slot);
             }
         }
     }
+    slots.extend(between_round_ends(parted, of_face, walls));
     (distinct(slots, is_same_slot), distinct(pockets, is_same_pocket))
+}
+
+/// Slots of which both half-round ends are there: what is between them may be in pieces, or hardly there.
+fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
+    let is_end = |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
+    let ends: Vec<&Wall> = walls.iter().filter(is_end).collect();
+    let mut slots = Vec::new();
+    for (at, one) in ends.iter().enumerate() {
+        for other in &ends[..at] {
+            slots.extend(slot_of_ends(parted, of_face, [one, other]));
+        }
+    }
+    slots
+}
+
+/// The slot that two half-round walls close, when each is open towards the other.
+fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
+    let [one, other] = ends;
+    let width = one.radius() + other.radius();
+    let axis = one.axis;
+    let is_alike = (one.radius() - other.radius()).abs() < ABOUT * width && axis.dot(&other.axis).abs() > ENDS_PARALLEL;
+    let v = other.at(other.middle()) - one.at(one.middle());
+    let apart = v - axis * v.dot(&axis);
+    let is_beside = v.dot(&axis).abs() < (one.height() + other.height()) / 2.0;
+    let distance = apart.norm();
+    let is_far = distance > (LONG - 1.0) * width && distance < LONGEST * width;
+    if !is_alike || !is_beside || !is_far {
+        return None;
+    }
+    let direction = apart / distance;
+    let is_away = one.towards.dot(&direction) < -AWAY && other.towards.dot(&direction) > AWAY;
+    if !is_away {
+        return None;
+    }
+    let middle = nalgebra::center(&one.at(one.middle()), &other.at(other.middle()));
+    let across = axis.cross(&direction);
+    let around = parted.around(one.segments[0]);
+    let mut rays = around.rays(width);
+    // nothing stands between them
+    if [direction, -direction].iter().any(|along| rays.free(&middle, along, distance) < distance / 2.0) {
+        return None;
+    }
+    let segment_of = |met: Option<RayHit>| {
+        let number = of_face[met?.face.0 as usize];
+        (number != NONE).then_some(number as usize)
+    };
+    let sides = [across, -across].map(|out| rays.first(&middle, &out, 1.2 * width));
+    // a recess of another outline is wider there, or narrower
+    let is_straight = |met: &RayHit| (met.distance - width / 2.0).abs() < ABOUT * width;
+    if sides.iter().all(Option::is_none) || !sides.iter().flatten().all(is_straight) {
+        return None;
+    }
+    let sides = sides.map(segment_of);
+    let rings = [RINGS * width / 2.0];
+    // the opening is where a plane, or a cylinder, is around one of the ends
+    let opening = [1.0, -1.0].into_iter().find_map(|sign| {
+        let out = axis * sign;
+        ends.into_iter().find_map(|end| {
+            let t = end.ends[usize::from(end.axis.dot(&out) > 0.0)];
+            let (land, _) =
+                parted.land_around(&around, &end.at(t), &out, &rings, 0.2 * width).filter(|&(_, share)| share > 0.2)?;
+            let up = parted.exit(land, &middle, &out).filter(|&up| up > 0.0)?;
+            Some((out, land, up))
+        })
+    });
+    let (out, land, up) = opening?;
+    if rays.free(&middle, &out, up + width) < up + width / 2.0 {
+        return None;
+    }
+    let lowest = |wall: &Wall| wall.ends.map(|t| (wall.at(t) - middle).dot(&-out)).into_iter().fold(0.0, f64::max);
+    let deepest = lowest(one).max(lowest(other));
+    let met = rays.first(&middle, &-out, deepest + width);
+    let floor = segment_of(met).filter(|&number| is_square(parted, number, &out));
+    let down =
+        floor.and_then(|number| parted.exit(number, &middle, &-out)).or(met.map(|met| met.distance)).unwrap_or(deepest);
+    let [from, to] = ends.map(|wall| wall.segments[0]);
+    Some(Slot {
+        walls: [sides[0].unwrap_or(from), sides[1].unwrap_or(to)],
+        ends: [Some(to), Some(from)],
+        centre: middle + out * up,
+        out,
+        direction,
+        width,
+        length: distance + width,
+        depth: up + down,
+        through: met.is_none(),
+        floor,
+        land,
+        is_boxed: false,
+        is_aslant: false,
+        // flat walls that are there say more
+        area: 0.0,
+    })
 }
 
 /// Whether a void with flat ends is a pocket, seen by the pair of walls that is closer.
@@ -198,9 +304,9 @@ fn between(
     let middle = *middles.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
     let width = planes[1].along(&middle, &n)? + planes[0].along(&middle, &-n)?;
     let area = share * parted.segment(from).area;
-    let lands = lands(parted, borders, walls, &n);
+    let lands = lands(parted, borders, walls, &middle, &n);
     let seen = lands.into_iter().filter_map(|(land, out)| {
-        opened(parted, of_face, &Opened { walls, middle, middles: &middles, across: n, width, land, out, area })
+        opened(parted, of_face, &Opened { walls, middle, across: n, width, land, out, area })
     });
     let longest = seen.max_by(|a, b| a.length.total_cmp(&b.length))?;
     Some((longest, share))
@@ -226,8 +332,15 @@ fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
     points
 }
 
-/// Planes that fall away from one of the walls, square to both: around an opening. With the outward direction.
-fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3<f64>) -> Vec<(usize, Vector3<f64>)> {
+/// Planes and cylinders that fall away from one of the walls, square to both: around an opening. With the outward direction at the
+/// middle of the void.
+fn lands(
+    parted: &Parted,
+    borders: &Borders,
+    walls: [usize; 2],
+    middle: &Point3<f64>,
+    across: &Vector3<f64>,
+) -> Vec<(usize, Vector3<f64>)> {
     let mut lands: Vec<(usize, Vector3<f64>)> = Vec::new();
     for (pair, border) in borders {
         let [a, b] = pair.map(|number| number as usize);
@@ -235,10 +348,12 @@ fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3
         if walls.contains(&a) == walls.contains(&b) {
             continue;
         }
-        let Some((one, other)) = parted.plane(a).zip(parted.plane(b)) else { continue };
-        let out = if land == a { one } else { other }.normal();
+        if parted.plane(land).is_none() && !parted.is_shaft(land) {
+            continue;
+        }
+        let out = parted.segment(land).primitive.distance_and_normal(middle).1;
         let is_new = lands.iter().all(|(_, other)| other.dot(&out) < PARALLEL);
-        if is_new && out.dot(across).abs() < SQUARE && is_convex(parted, border, [one, other]) {
+        if is_new && out.dot(across).abs() < SQUARE && is_convex(parted, border, [a, b]) {
             let out = (out - across * out.dot(across)).normalize();
             lands.push((land, out));
         }
@@ -247,10 +362,9 @@ fn lands(parted: &Parted, borders: &Borders, walls: [usize; 2], across: &Vector3
 }
 
 /// Two walls, seen from one of the planes around them.
-struct Opened<'a> {
+struct Opened {
     walls: [usize; 2],
     middle: Point3<f64>,
-    middles: &'a [Point3<f64>],
     across: Vector3<f64>,
     width: f64,
     land: usize,
@@ -259,10 +373,10 @@ struct Opened<'a> {
 }
 
 fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
-    let Opened { walls, middle, middles, across, width, land, out, area } = *seen;
+    let Opened { walls, middle, across, width, land, out, area } = *seen;
     let mut rays = parted.around(walls[0]).rays(width);
     let reach = parted.diagonal;
-    let up = parted.plane(land)?.along(&middle, &out)?;
+    let up = parted.exit(land, &middle, &out)?;
     if up < 0.0 || rays.free(&middle, &out, reach) < up + width / 2.0 {
         return None;
     }
@@ -270,7 +384,14 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         met.map(|met| of_face[met.face.0 as usize]).filter(|&number| number != NONE).map(|number| number as usize)
     };
     let below = rays.first(&middle, &-out, reach);
-    let walls_end = |along: &Vector3<f64>| middles.iter().map(|p| (p - middle).dot(along)).fold(0.0, f64::max);
+    let walls_end = |along: &Vector3<f64>| {
+        let of_wall = |number: usize| {
+            let corners = parted.segment(number).faces.iter().flat_map(|&face| parted.facets.triangle(face));
+            corners.map(|p| (p - middle).dot(along)).fold(0.0, f64::max)
+        };
+        // one of them may go on beyond the slot
+        of_wall(walls[0]).min(of_wall(walls[1]))
+    };
     // a floor far below belongs to something else
     let deepest = walls_end(&-out) + 2.0 * width;
     let met = below.filter(|met| met.distance < deepest);

@@ -57,7 +57,9 @@ impl Tracker {
         self.unexplained = Some(unexplained);
         let mut known = std::mem::take(&mut self.features);
         for feature in &mut features {
-            let same = known.iter().position(|before| is_same(before, feature));
+            let off = |before: &Feature| (before.centre.value - feature.centre.value).norm();
+            let alike = known.iter().enumerate().filter(|(_, before)| is_same(before, feature));
+            let same = alike.min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))).map(|(at, _)| at);
             feature.id = same.map_or_else(|| self.fresh_id(), |at| known.swap_remove(at).id);
         }
         features.sort_by_key(|feature| feature.id);
@@ -118,7 +120,7 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
     let off = one.centre.value - other.centre.value;
     // a hole is the same however deep it has become
     let off = match (one.kind, &one.axis) {
-        (Kind::Hole | Kind::Boss, Some(axis)) => off - axis.value * off.dot(&axis.value),
+        (Kind::Hole | Kind::Boss | Kind::Cylinder, Some(axis)) => off - axis.value * off.dot(&axis.value),
         _ => off,
     };
     let (a, b) = (size(one), size(other));
@@ -131,10 +133,13 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
     let reach = if touch.radius > 0.0 { touch.radius } else { RADIUS };
     let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_rejected) else { return false };
     let height = feature.depth.as_ref().map_or(0.0, |depth| depth.value);
+    let half_length = feature.length.as_ref().map_or(0.0, |length| length.value / 2.0);
     let along = (touch.point - feature.centre.value).dot(&axis.value);
     // a hole lies below its opening, a boss rises from its foot
     let is_between = match feature.kind {
         Kind::Boss => along > 0.0 && along < height + reach,
+        Kind::Cylinder if feature.depth.is_none() => along.abs() < half_length,
+        Kind::Cylinder => along > 0.0 && along < height,
         _ => along < 0.0 && along > -height - reach,
     };
     let far = size(feature) + feature.length.as_ref().map_or(0.0, |length| length.value) + height + reach;

@@ -29,6 +29,8 @@ pub(super) struct Wall {
     pub coverage: f64,
     /// share of what it is between its ends that its faces cover
     pub filled: f64,
+    /// unit vector from the axis to the middle of the parts of the turn that it covers; 0 where there is none
+    pub towards: Vector3<f64>,
 }
 
 /// Into so many parts a turn is divided.
@@ -89,8 +91,16 @@ impl Wall {
         let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
         let [Some(low), Some(high)] = ends else { return None };
         let ends = [low, high];
+        let away = |part: usize| {
+            let (sine, cosine) = (std::f64::consts::TAU * (part as f64 + 0.5) / PARTS as f64).sin_cos();
+            e * cosine + g * sine
+        };
+        let is_covered = |&part: &usize| parts[part][0] <= parts[part][1];
+        let towards = (0..PARTS).filter(is_covered).map(away).sum::<Vector3<f64>>();
+        let towards = towards.try_normalize(f64::EPSILON * PARTS as f64).unwrap_or_default();
+        let filled = 0.0;
         let mut wall =
-            Self { radius_at_origin, half_angle, is_concave, segments, origin, axis, ends, coverage, filled: 0.0 };
+            Self { radius_at_origin, half_angle, is_concave, segments, origin, axis, ends, coverage, filled, towards };
         let slant = wall.radius() / half_angle.unwrap_or(0.0).cos();
         let whole = std::f64::consts::TAU * slant * wall.height() * coverage;
         wall.filled = if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 };

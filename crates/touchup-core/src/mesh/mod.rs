@@ -19,7 +19,7 @@ pub use journal::{Changes, IdSet};
 pub use region::{Outside, Region, Sewn};
 pub use repair::{RepairReport, repair};
 pub(crate) use signed_distance::corner_normal;
-pub use signed_distance::{pseudo_normal, signed_distance};
+pub use signed_distance::{is_on_rim, pseudo_normal, signed_distance};
 pub use tri_mesh::{FARTHEST, MeshError, TriMesh, is_place};
 pub(crate) use workers::map_by;
 pub use workers::{Alone, Job, Workers};

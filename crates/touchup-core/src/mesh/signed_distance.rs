@@ -41,6 +41,21 @@ pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     weighted.sum()
 }
 
+/// Whether a closest point lies on an edge that one face alone has.
+pub fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
+    let corners = mesh.corners(hit.face);
+    let is_open = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).nth(1).is_none();
+    let mut on = (0..3).filter(|&i| hit.barycentric[i] != 0.0).map(|i| corners[i]);
+    match (on.next(), on.next(), on.next()) {
+        (Some(corner), None, None) => {
+            let mut around = mesh.star(corner).iter().flat_map(|&face| mesh.corners(face));
+            around.any(|other| other != corner && is_open(corner, other))
+        }
+        (Some(a), Some(b), None) => is_open(a, b),
+        _ => false,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -56,7 +56,7 @@ pub(super) fn feature_numbers(feature: &Feature, plate: &Plate) -> Vec<(Coverage
         Kind::Hole | Kind::Slot | Kind::Boss => plate.features().iter().find_map(|truth| of_walls(feature, truth)),
         Kind::Plane => of_plane(feature, plate),
         Kind::Edge => of_edge(feature, plate),
-        Kind::Pocket | Kind::Corner => None,
+        Kind::Pocket | Kind::Corner | Kind::Cylinder | Kind::Notch => None,
     }
     .unwrap_or_default();
     if feature.fitted_to == FittedTo::Mesh {

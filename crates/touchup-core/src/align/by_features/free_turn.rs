@@ -61,8 +61,8 @@ fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
         let is_on = (landmark.place - through).cross(&axis).norm() <= near;
         match landmark.kind {
             Kind::Plane => is_along,
-            Kind::Hole | Kind::Boss => is_along && is_on,
-            Kind::Slot | Kind::Pocket | Kind::Edge | Kind::Corner => false,
+            Kind::Hole | Kind::Boss | Kind::Cylinder => is_along && is_on,
+            Kind::Slot | Kind::Pocket | Kind::Edge | Kind::Corner | Kind::Notch => false,
         }
     };
     landmarks.iter().all(is_about).then_some(FreeTurn { axis, through })

@@ -22,6 +22,8 @@ pub(super) struct Landmark {
     span: [f64; 2],
     /// it goes through: which end is the opening is a matter of how it was seen
     is_through: bool,
+    /// whether it stands on the shoulder of a shaft
+    is_step: bool,
     is_convex: Option<bool>,
     /// normals of the planes that meet in a corner, so that they turn to the left seen from outside
     pub normals: Option<[Vector3<f64>; 3]>,
@@ -62,6 +64,7 @@ impl Landmark {
             sigma: feature.centre.std.unwrap_or(0.0),
             span: reach,
             is_through: feature.through == Some(true),
+            is_step: feature.kind == Kind::Cylinder && feature.depth.is_some(),
             is_convex: feature.is_convex,
             normals: (feature.kind == Kind::Corner).then(|| normals_at(&place, planes, near)).flatten(),
         }
@@ -69,7 +72,13 @@ impl Landmark {
 
     /// Whether it has a position and an outward direction, so that two of them determine a motion.
     pub fn is_located(&self) -> bool {
-        matches!(self.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss) && self.axis.is_some()
+        let has_place = match self.kind {
+            Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => true,
+            // that of a step is on its shoulder, that of another is somewhere on its axis
+            Kind::Cylinder => self.is_step,
+            _ => false,
+        };
+        has_place && self.axis.is_some()
     }
 
     /// Its kind; where a slot ends and a pocket begins is a matter of taste.
@@ -93,7 +102,8 @@ impl Landmark {
             Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => 1.0,
             Kind::Corner => 0.5,
             Kind::Edge => 0.25,
-            Kind::Plane => 0.2,
+            Kind::Cylinder if self.is_step => 1.0,
+            Kind::Plane | Kind::Cylinder | Kind::Notch => 0.2,
         }
     }
 

@@ -59,10 +59,51 @@ impl Cylinder {
     }
 }
 
+impl Cylinder {
+    /// How far along the unit vector `direction` from `from` (in O) the cylinder is left, m; `None` where it is not met, or along its axis.
+    pub(crate) fn exit(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        let axis = self.axis();
+        let across = |v: Vector3<f64>| v - axis * v.dot(&axis);
+        let (p, d) = (across(from - self.center()), across(*direction));
+        // |p + t d|² = R²
+        let (a, b, c) = (d.norm_squared(), p.dot(&d), p.norm_squared() - self.radius * self.radius);
+        let square = b * b - a * c;
+        (a > 0.0 && square >= 0.0).then(|| (square.sqrt() - b) / a)
+    }
+}
+
 impl Fit<Cylinder> {
+    /// Standard deviation of the distance of `point` from the surface, m; `None` where it is not fixed.
+    pub(crate) fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.std_of(&by)
+    }
+
+    /// As [`Self::std_at`], without what all observations have in common.
+    pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.own_std_of(&by)
+    }
+
     /// Root mean square distance across the axis by which a place on it may be off, m.
     pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
         let height = self.surface.pose_of.inverse_transform_point(at).z;
         self.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_leaves_a_cylinder_on_its_far_side() {
+        // about z, 5 across: a line along (3, 4, 0)/5 from (−1, 0, 2) leaves where (−1 + 0.6 t)² + (0.8 t)² = 25
+        let cylinder = Cylinder::new(Point3::new(0.0, 0.0, 7.0), &Vector3::z(), 5.0, false);
+        let from = Point3::new(-1.0, 0.0, 2.0);
+        let t = cylinder.exit(&from, &Vector3::new(0.6, 0.8, 0.0)).unwrap();
+        assert!((t - (0.6 + f64::sqrt(0.36 + 24.0))).abs() < 1e-12, "{t}");
+        assert_eq!(cylinder.exit(&from, &Vector3::z()), None, "along the axis");
+        assert_eq!(cylinder.exit(&Point3::new(6.0, 0.0, 0.0), &Vector3::y()), None, "beside it");
     }
 }

@@ -80,7 +80,9 @@ impl Explorer {
             Some(Kind::Boss) => Box::new(boss::BossPattern::new()),
             Some(Kind::Edge) => Box::new(edge::EdgePattern::new()),
             Some(Kind::Plane) => Box::new(plane::PlanePattern::new(&params)),
-            Some(Kind::Corner) => return Err(ExploreError::NoPattern { kind: Kind::Corner.name() }),
+            Some(kind @ (Kind::Corner | Kind::Cylinder | Kind::Notch)) => {
+                return Err(ExploreError::NoPattern { kind: kind.name() });
+            }
             None => Box::new(region::RegionPattern::new(&params)),
         };
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));

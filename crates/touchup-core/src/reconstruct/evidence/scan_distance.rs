@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::mesh::{FaceHit, FaceTree, TriMesh, VertexId, pseudo_normal};
+use crate::mesh::{FaceTree, TriMesh, is_on_rim, pseudo_normal};
 
 /// The scan as seen from one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,21 +26,6 @@ impl ScanDistance {
         let distance = hit.distance_squared.sqrt();
         let value = if is_behind { -distance } else { distance };
         Some(Self { value, normal, foot: hit.point, is_on_rim: is_on_rim(scan, &hit) })
-    }
-}
-
-/// Whether a closest point lies on an edge that one face alone has.
-fn is_on_rim(scan: &TriMesh, hit: &FaceHit) -> bool {
-    let corners = scan.corners(hit.face);
-    let is_open = |a: VertexId, b: VertexId| scan.faces_at_edge(a, b).nth(1).is_none();
-    let mut on = (0..3).filter(|&i| hit.barycentric[i] != 0.0).map(|i| corners[i]);
-    match (on.next(), on.next(), on.next()) {
-        (Some(corner), None, None) => {
-            let mut around = scan.star(corner).iter().flat_map(|&face| scan.corners(face));
-            around.any(|other| other != corner && is_open(corner, other))
-        }
-        (Some(a), Some(b), None) => is_open(a, b),
-        _ => false,
     }
 }
 

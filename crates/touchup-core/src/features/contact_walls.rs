@@ -1,0 +1,467 @@
+//! Walls that the contacts show, round and flat ones, however coarse the mesh is there.
+//!
+//! A ball that runs along a round wall keeps its centre at one distance ρ from the axis: ρ = R − r in a bore, R + r around a boss. Seen along
+//! the axis, two contacts with centres p, q and normals m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, where ρ
+//! is positive in a bore and negative around a boss. Directions of axes come of the planes of the part, on which holes stand square, and of
+//! the normals of contacts that no plane explains.
+
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+
+use super::facets::NONE;
+use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
+use super::grow::belongs;
+use super::observe::{groups, observation};
+use super::primitive::Primitive;
+use super::scene::Parted;
+use super::segment::Segment;
+use crate::mesh::BoxQuery;
+use crate::numeric::{DisjointSets, PointGrid, VoxelKey, distinct, mean, median, spreads, tangent_basis, voxel_of};
+use crate::stylus::ProbedPoint;
+
+/// Of contacts closer together than this share of the ball's radius one is enough.
+const THIN: f64 = 0.25;
+/// A contact is on a plane when it is off it by no more than so many standard deviations, or this share of the radius, m …
+const ON_PLANE_SIGMAS: f64 = 4.0;
+const ON_PLANE: f64 = 0.06;
+/// … and its normal is off by less than 25°.
+const ALIKE: f64 = 0.906;
+/// Contacts no farther apart than so many radii of the ball hang together.
+const TOGETHER: f64 = 1.6;
+/// A wall's contacts are square to its axis within 20°: friction and noise.
+const SQUARE: f64 = 0.34;
+/// Directions of axes are the same within 3°.
+const SAME_AXIS: f64 = 0.9986;
+/// So many directions of planes are examined, those of the largest first.
+const MOST_AXES: usize = 12;
+/// Pairs of contacts that are examined in one group.
+const PAIRS: usize = 400;
+/// A contact is on a circle within this share of the ball's radius while it is searched …
+const SEARCHED: f64 = 0.1;
+/// … and its normal within 35°.
+const RADIAL: f64 = 0.82;
+/// Parts of a turn.
+const PARTS: usize = 24;
+/// A cylinder was touched over at least this share of a turn.
+const TURN: f64 = 0.42;
+/// … by at least so many contacts, with no gap in it of more than this share of a turn where it is a bore.
+const LEAST: usize = 12;
+/// Contacts from which a flat wall is tried, of one group.
+const STARTS: usize = 40;
+/// A flat wall is at least so many radii of the ball long, and its contacts determine a tilt when they are this wide, in radii.
+const FLAT_RADII: f64 = 1.5;
+const WIDE_RADII: f64 = 0.25;
+/// No more of a flat wall than this share is round in the mesh.
+const MOST_ROUND: f64 = 0.3;
+/// Walls of one kind in one group.
+const MOST_IN_GROUP: usize = 6;
+/// Radii between these many radii of the ball.
+const RADII: [f64; 2] = [1.02, 40.0];
+/// Faces of the mesh are of the cylinder within this share of the ball's radius, and as far beyond its ends.
+const MESH_OFF: f64 = 0.25;
+const MESH_BEYOND: f64 = 0.6;
+/// Two cylinders are one when radii and places agree within this share of the radius.
+const SAME: f64 = 0.12;
+/// A round piece of the mesh is of the same wall when radii and places agree within this share of the radius, and of that of the ball: a scan
+/// is blurred, and steps of a hole or shaft differ by more.
+const SAME_WALL: f64 = 0.15;
+const SAME_WALL_OF_BALL: f64 = 0.35;
+/// A segment is told to be as exact as this share of the ball's radius.
+const TOLERANCE: f64 = 0.05;
+
+/// A cylinder and the contacts on it.
+#[derive(Clone, Debug)]
+struct ContactCylinder {
+    surface: Cylinder,
+    /// along the axis from the centre of the surface, m: from the lowest to the highest contact
+    ends: [f64; 2],
+    count: usize,
+}
+
+/// A flat wall and the contacts on it.
+#[derive(Clone, Debug)]
+struct ContactPlane {
+    surface: Plane,
+    touches: Vec<usize>,
+}
+
+/// All walls that contacts show.
+#[derive(Default)]
+struct ContactWalls {
+    cylinders: Vec<ContactCylinder>,
+    planes: Vec<ContactPlane>,
+}
+
+/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie on it.
+pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) {
+    let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
+    let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
+    let of_planes = planes.iter().map(|found| (Primitive::Plane(found.surface), faces_by(parted, found, touches)));
+    let of_cylinders = cylinders.iter().map(|found| {
+        let faces = [faces_on(parted, found, radius), faces_of_same(parted, found, radius)].concat();
+        (Primitive::Cylinder(found.surface), distinct(faces))
+    });
+    let found: Vec<_> = of_planes.chain(of_cylinders).collect();
+    for (primitive, faces) in found {
+        let area = parted.facets.area_of(&faces);
+        if area > 0.0 {
+            let segment = Segment { primitive, faces, area, tolerance: TOLERANCE * radius, is_exact: false };
+            parted.segmentation.add(&parted.facets, segment);
+        }
+    }
+}
+
+/// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody touched: one wall is one feature.
+fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
+    let Cylinder { radius, concave, .. } = found.surface;
+    let near = (SAME_WALL * radius).min(SAME_WALL_OF_BALL * of_ball);
+    let (axis, centre) = (found.surface.axis(), found.surface.center());
+    let is_same = |segment: &&Segment| {
+        let Primitive::Cylinder(other) = segment.primitive else { return false };
+        let aside = (other.center() - centre).cross(&axis).norm();
+        let along =
+            segment.faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| (p - centre).dot(&axis));
+        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)]);
+        other.concave == concave
+            && (other.radius - radius).abs() < near
+            && aside < near
+            && other.axis().dot(&axis).abs() > ALIKE
+            && low < found.ends[1] + radius
+            && high > found.ends[0] - radius
+    };
+    parted.segmentation.segments.iter().filter(is_same).flat_map(|segment| segment.faces.iter().copied()).collect()
+}
+
+/// Faces of the mesh on a plane beside the contacts on it.
+fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> Vec<u32> {
+    let primitive = Primitive::Plane(found.surface);
+    let mut query = BoxQuery::default();
+    let mut faces = Vec::new();
+    for touch in found.touches.iter().map(|&at| &touches[at]) {
+        let reach = Vector3::repeat(TOGETHER * touch.radius);
+        parted.tree.faces_in_box(&(touch.point - reach), &(touch.point + reach), &mut query);
+        faces.extend(query.faces.iter().map(|face| face.0));
+    }
+    let mut faces = distinct(faces);
+    let radius = touches[found.touches[0]].radius;
+    faces.retain(|&face| belongs(&parted.facets, face, &primitive, MESH_OFF * radius));
+    // a few contacts of a round wall lie on a plane too
+    let is_round = |face: &u32| {
+        let number = parted.segmentation.of_face[*face as usize];
+        number != NONE && matches!(parted.segment(number as usize).primitive, Primitive::Cylinder(_))
+    };
+    let round: f64 = faces.iter().filter(|face| is_round(face)).map(|&face| parted.facets.area(face)).sum();
+    if round > MOST_ROUND * parted.facets.area_of(&faces) { Vec::new() } else { faces }
+}
+
+/// Faces of the mesh on a cylinder, as far as it was touched.
+fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
+    let Cylinder { radius: of_wall, .. } = found.surface;
+    let (axis, centre) = (found.surface.axis(), found.surface.center());
+    let ends = found.ends.map(|t| centre + axis * t);
+    let reach = Vector3::repeat(of_wall + radius);
+    let mut query = BoxQuery::default();
+    parted.tree.faces_in_box(&(ends[0].inf(&ends[1]) - reach), &(ends[0].sup(&ends[1]) + reach), &mut query);
+    let primitive = Primitive::Cylinder(found.surface);
+    let [low, high] = [found.ends[0] - MESH_BEYOND * radius, found.ends[1] + MESH_BEYOND * radius];
+    let is_of = |face: u32| {
+        let along = (parted.facets.mesh.barycentre(crate::mesh::FaceId(face)) - centre).dot(&axis);
+        (low..=high).contains(&along) && belongs(&parted.facets, face, &primitive, MESH_OFF * radius)
+    };
+    let mut faces: Vec<u32> = query.faces.iter().map(|face| face.0).filter(|&face| is_of(face)).collect();
+    faces.sort_unstable();
+    faces
+}
+
+/// A contact seen along an axis.
+struct Projected {
+    touch: usize,
+    /// centre of the ball, m
+    at: Point2<f64>,
+    /// unit normal into the air
+    normal: Vector2<f64>,
+}
+
+/// All walls that contacts show, those with the most contacts first.
+fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
+    let kept = thinned(touches);
+    let Some(radius) = kept.first().map(|&at| touches[at].radius) else { return ContactWalls::default() };
+    let planes = large_planes(parted);
+    let is_on_plane = |touch: &ProbedPoint| planes.iter().any(|&number| is_on(parted, number, touch));
+    let free: Vec<usize> = kept.iter().copied().filter(|&at| !is_on_plane(&touches[at])).collect();
+    let group_of = groups(touches);
+    let mut found = ContactWalls::default();
+    let mut left = vec![true; touches.len()];
+    for axis in axes(parted, &planes, touches, &free, radius) {
+        let is_wall = |&at: &usize| left[at] && touches[at].normal.dot(&axis).abs() < SQUARE;
+        let walls: Vec<usize> = free.iter().copied().filter(is_wall).collect();
+        for members in together(touches, &walls, TOGETHER * radius) {
+            for (one, on) in circles(touches, &members, &axis, radius, &group_of) {
+                on.iter().for_each(|&at| left[at] = false);
+                if !found.cylinders.iter().any(|other| is_same(other, &one)) {
+                    found.cylinders.push(one);
+                }
+            }
+        }
+    }
+    let rest: Vec<usize> = free.into_iter().filter(|&at| left[at]).collect();
+    for members in together(touches, &rest, TOGETHER * radius) {
+        found.planes.extend(flat_walls(touches, members));
+    }
+    found.planes.sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
+    found.cylinders.sort_by_key(|one| std::cmp::Reverse(one.count));
+    found
+}
+
+/// The planes that contacts lie on.
+fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane> {
+    let mut found = Vec::new();
+    while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
+        let on = |plane: &Plane| -> Vec<usize> {
+            let is_on = |&at: &usize| {
+                let touch = &touches[at];
+                let off = plane.distance(&touch.centre) - touch.radius;
+                off.abs() < SEARCHED * touch.radius && plane.normal().dot(&touch.normal) > ALIKE
+            };
+            left.iter().copied().filter(is_on).collect()
+        };
+        let starts = left.iter().step_by(left.len().div_ceil(STARTS)).map(|&at| &touches[at]);
+        let planes = starts.map(|touch| on(&Plane::new(touch.point, &touch.normal)));
+        let Some(members) = planes.max_by_key(Vec::len) else { break };
+        let Some(plane) = plane_through(touches, &members) else { break };
+        let members = on(&plane);
+        let is_wide = members.len() >= LEAST && extent(touches, &members) > FLAT_RADII * touches[members[0]].radius;
+        if !is_wide {
+            break;
+        }
+        left.retain(|at| members.binary_search(at).is_err());
+        found.push(ContactPlane { surface: plane, touches: members });
+    }
+    found
+}
+
+/// The plane through contacts; across what they do not determine their normals do.
+fn plane_through(touches: &[ProbedPoint], members: &[usize]) -> Option<Plane> {
+    let normal: Vector3<f64> = members.iter().map(|&at| touches[at].normal).sum();
+    let normal = normal.try_normalize(0.0)?;
+    let middle = mean(members.iter().map(|&at| touches[at].centre.coords));
+    let spread: nalgebra::Matrix3<f64> =
+        members.iter().map(|&at| touches[at].centre.coords - middle).map(|v| v * v.transpose()).sum();
+    let eigen = (spread / members.len() as f64).symmetric_eigen();
+    let widths = [0, 1, 2].map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
+    let longest = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let radius = touches[members[0]].radius;
+    let mut rising = widths;
+    rising.sort_by(f64::total_cmp);
+    let thinnest = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let fitted = if rising[1] > WIDE_RADII * radius { thinnest } else { normal - longest * normal.dot(&longest) };
+    let fitted = fitted.try_normalize(0.0)? * fitted.dot(&normal).signum();
+    Some(Plane::new(Point3::from(middle) - fitted * radius, &fitted))
+}
+
+/// Diagonal of the box around contacts, m.
+fn extent(touches: &[ProbedPoint], members: &[usize]) -> f64 {
+    let points = members.iter().map(|&at| touches[at].point);
+    let bounds = points.fold(None, |bounds: Option<[Point3<f64>; 2]>, p| {
+        Some(bounds.map_or([p, p], |[low, high]| [low.inf(&p), high.sup(&p)]))
+    });
+    bounds.map_or(0.0, |[low, high]| (high - low).norm())
+}
+
+/// Contacts to look at: one of those that are close together.
+fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
+    let mut seen = std::collections::BTreeSet::<VoxelKey>::new();
+    let mut is_new = |touch: &ProbedPoint| seen.insert(voxel_of(&touch.point, THIN * touch.radius));
+    let is_sound = |touch: &ProbedPoint| !touch.is_rejected && touch.radius > 0.0;
+    (0..touches.len()).filter(|&at| is_sound(&touches[at]) && is_new(&touches[at])).collect()
+}
+
+/// Numbers of the planes that holes may stand on, the largest first.
+fn large_planes(parted: &Parted) -> Vec<usize> {
+    let mut numbers: Vec<usize> =
+        parted.planes().map(|(number, ..)| number).filter(|&number| parted.is_strong(number)).collect();
+    numbers.sort_by(|&a, &b| parted.segment(b).area.total_cmp(&parted.segment(a).area));
+    numbers
+}
+
+fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool {
+    let Some(plane) = parted.plane(number) else { return false };
+    let near = (ON_PLANE_SIGMAS * touch.sigma_along_normal()).max(ON_PLANE * touch.radius);
+    (plane.distance(&touch.centre) - touch.radius).abs() < near && plane.normal().dot(&touch.normal) > ALIKE
+}
+
+/// Directions that axes may have.
+fn axes(parted: &Parted, planes: &[usize], touches: &[ProbedPoint], free: &[usize], radius: f64) -> Vec<Vector3<f64>> {
+    let mut axes: Vec<Vector3<f64>> = Vec::new();
+    let mut add = |axis: Vector3<f64>| {
+        if axes.len() < MOST_AXES && axes.iter().all(|other: &Vector3<f64>| other.dot(&axis).abs() < SAME_AXIS) {
+            axes.push(axis);
+        }
+    };
+    planes.iter().filter_map(|&number| parted.plane(number)).for_each(|plane| add(plane.normal()));
+    // the normals of a round wall are square to its axis
+    for members in together(touches, free, TOGETHER * radius) {
+        let normals = members.iter().map(|&at| touches[at].normal);
+        let [least, second, _] = spreads(normals.clone());
+        if members.len() >= LEAST && least < 0.5 * second {
+            let second_moment: nalgebra::Matrix3<f64> = normals.map(|n| n * n.transpose()).sum();
+            let eigen = second_moment.symmetric_eigen();
+            add(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
+        }
+    }
+    axes
+}
+
+/// Contacts that hang together.
+fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<usize>> {
+    let points: Vec<Point3<f64>> = numbers.iter().map(|&at| touches[at].point).collect();
+    let grid = PointGrid::of(&points, 0..points.len(), reach);
+    let mut sets = DisjointSets::of(points.len());
+    for at in 0..points.len() {
+        for other in grid.near(&points[at], reach).filter(|&other| other < at) {
+            sets.join(at as u32, other as u32);
+        }
+    }
+    let mut members: std::collections::BTreeMap<u32, Vec<usize>> = std::collections::BTreeMap::new();
+    for (at, &number) in numbers.iter().enumerate() {
+        members.entry(sets.root(at as u32)).or_default().push(number);
+    }
+    members.into_values().filter(|members| members.len() >= LEAST).collect()
+}
+
+/// The circles that contacts lie on, seen along an axis, with the contacts of each.
+fn circles(
+    touches: &[ProbedPoint],
+    members: &[usize],
+    axis: &Vector3<f64>,
+    radius: f64,
+    group_of: &[u32],
+) -> Vec<(ContactCylinder, Vec<usize>)> {
+    let [e, g] = tangent_basis(axis);
+    let project = |&touch: &usize| {
+        let (p, n) = (touches[touch].centre.coords, touches[touch].normal);
+        let normal = Vector2::new(n.dot(&e), n.dot(&g)).try_normalize(0.0)?;
+        Some(Projected { touch, at: Point2::new(p.dot(&e), p.dot(&g)), normal })
+    };
+    let mut left: Vec<Projected> = members.iter().filter_map(project).collect();
+    let mut found = Vec::new();
+    while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
+        let Some((centre, rho)) = best_circle(&left, radius) else { break };
+        let on: Vec<usize> = (0..left.len()).filter(|&at| is_on_circle(&left[at], &centre, rho, radius)).collect();
+        let numbers: Vec<u32> = on.iter().map(|&at| left[at].touch as u32).collect();
+        if let Some(one) = cylinder_of(touches, &numbers, axis, (centre, rho), [e, g], radius, group_of) {
+            found.push((one, numbers.iter().map(|&number| number as usize).collect()));
+        }
+        let is_on = |projected: &Projected| is_on_circle(projected, &centre, rho, radius);
+        left.retain(|projected| !is_on(projected));
+    }
+    found
+}
+
+fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) -> bool {
+    let v = centre - one.at;
+    let distance = v.norm();
+    (distance - rho.abs()).abs() < SEARCHED * radius && v.dot(&one.normal) * rho.signum() > RADIAL * distance
+}
+
+/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m; `None` where none was over enough of it.
+fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64)> {
+    let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut next = |below: usize| {
+        // a fixed sequence of pairs: the same contacts give the same circles
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    for _ in 0..PAIRS.min(all.len() * all.len()) {
+        let (one, other) = (&all[next(all.len())], &all[next(all.len())]);
+        let (apart, turned) = (one.at - other.at, one.normal - other.normal);
+        if turned.norm_squared() < 0.3 {
+            continue;
+        }
+        let rho = -apart.dot(&turned) / turned.norm_squared();
+        let of_wall = rho.abs() + radius * rho.signum();
+        if of_wall < RADII[0] * radius * f64::from(rho > 0.0) || of_wall > RADII[1] * radius || of_wall <= 0.0 {
+            continue;
+        }
+        let centre = nalgebra::center(&(one.at + one.normal * rho), &(other.at + other.normal * rho));
+        let (count, turn) = support(all, &centre, rho, radius);
+        if best.as_ref().is_none_or(|&(most, number, ..)| (turn, count) > (most, number)) {
+            best = Some((turn, count, centre, rho));
+        }
+    }
+    let (_, _, mut centre, mut rho) = best?;
+    for _ in 0..3 {
+        (centre, rho) = fitted_circle(all, centre, rho, radius)?;
+    }
+    let (count, turn) = support(all, &centre, rho, radius);
+    (count >= LEAST && turn as f64 >= TURN * PARTS as f64).then_some((centre, rho))
+}
+
+/// How many contacts are on a circle, and over how many parts of a turn.
+fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (usize, usize) {
+    let (mut parts, mut count) = ([false; PARTS], 0);
+    for one in all.iter().filter(|one| is_on_circle(one, centre, rho, radius)) {
+        let v = one.at - centre;
+        let turn = v.y.atan2(v.x) / std::f64::consts::TAU;
+        parts[((turn * PARTS as f64).floor() as i64).rem_euclid(PARTS as i64) as usize] = true;
+        count += 1;
+    }
+    (count, parts.iter().filter(|part| **part).count())
+}
+
+/// The circle of least squares through the contacts on one: x² + y² = 2 a x + 2 b y + c.
+fn fitted_circle(all: &[Projected], centre: Point2<f64>, rho: f64, radius: f64) -> Option<(Point2<f64>, f64)> {
+    let rows = all.iter().filter(|one| is_on_circle(one, &centre, rho, radius)).map(|one| {
+        let v = one.at - centre;
+        (nalgebra::SVector::<f64, 3>::new(2.0 * v.x, 2.0 * v.y, 1.0), v.norm_squared())
+    });
+    let solution = crate::numeric::NormalEquations::of(rows).solution()?;
+    let moved = Vector2::new(solution.x, solution.y);
+    let square = solution.z + moved.norm_squared();
+    (square > 0.0).then(|| (centre + moved, square.sqrt().copysign(rho)))
+}
+
+/// The cylinder about a circle, its axis fitted too where the contacts determine it.
+fn cylinder_of(
+    touches: &[ProbedPoint],
+    numbers: &[u32],
+    axis: &Vector3<f64>,
+    (centre, rho): (Point2<f64>, f64),
+    [e, g]: [Vector3<f64>; 2],
+    radius: f64,
+    group_of: &[u32],
+) -> Option<ContactCylinder> {
+    let along = |axis: &Vector3<f64>, from: &Point3<f64>| -> Vec<f64> {
+        numbers.iter().map(|&number| (touches[number as usize].point - from).dot(axis)).collect()
+    };
+    let height = median(&mut along(axis, &Point3::origin()))?;
+    let middle = Point3::from(e * centre.x + g * centre.y + axis * height);
+    let of_wall = rho.abs() + radius * rho.signum();
+    let guess = Cylinder::new(middle, axis, of_wall, rho > 0.0);
+    let observations: Vec<_> =
+        numbers.iter().map(|&number| observation(&touches[number as usize], group_of[number as usize])).collect();
+    let params = FitParams { axis_sigma: Some(AXIS_SIGMA), ..FitParams::default() };
+    let surface = fit(&guess, &observations, &params).map_or(guess, |fit| fit.surface);
+    let is_near = (surface.radius - of_wall).abs() < SAME * of_wall && surface.axis_towards(axis).dot(axis) > ALIKE;
+    let surface = if is_near { surface } else { guess };
+    let of_axis = along(&surface.axis(), &surface.center());
+    let ends = of_axis.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| [low.min(t), high.max(t)]);
+    Some(ContactCylinder { surface, ends, count: numbers.len() })
+}
+
+/// How well the direction of an axis is known before its contacts are, rad: 3°.
+const AXIS_SIGMA: f64 = 0.05;
+
+fn is_same(one: &ContactCylinder, other: &ContactCylinder) -> bool {
+    let (a, b) = (&one.surface, &other.surface);
+    let v = b.center() - a.center();
+    let along = v.dot(&a.axis());
+    let aside = (v - a.axis() * along).norm();
+    let is_beside = along + other.ends[1].abs().max(other.ends[0].abs()) > one.ends[0]
+        && along - other.ends[1].abs().max(other.ends[0].abs()) < one.ends[1];
+    a.concave == b.concave
+        && is_beside
+        && a.axis().dot(&b.axis()).abs() > ALIKE
+        && (a.radius - b.radius).abs() < SAME * a.radius
+        && aside < SAME * a.radius
+}

@@ -1,0 +1,164 @@
+"""Parts of the families scanned and touched by `touchup simulate`, refined, and their features judged."""
+
+import json
+import subprocess
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from .families import random_part
+from .judge import TOUCHED, Verdict, described, judge
+from .part import Part
+
+WORLDS = ["workshop_stylus", "ur", "optical_tracker"]
+SIDES = {"shaft": "z,y,-y,x", "bracket": "z,-x,x", "sheet": "z"}
+# a point of a wall is touched when a contact is within this, mm
+NEAR_MM = 1.0
+# room that a ball needs beyond its own width to go in, mm
+ROOM_MM = 1.0
+
+
+class Failed(Exception):
+    """A command that ended otherwise than it should."""
+
+
+@dataclass
+class Result:
+    name: str
+    world: str
+    part: Part
+    # of each feature the share of its wall that was touched
+    shares: list
+    verdict: Verdict
+
+    def lines(self):
+        """What went wrong, one line each."""
+        share_of = {id(feature): share for feature, share in zip(self.part.features, self.shares)}
+        for feature in self.verdict.missed:
+            yield f"{self.name}: missed {described(feature)} (touched {share_of[id(feature)]:.0%})"
+        for feature in self.verdict.false:
+            yield f"{self.name}: false {described(feature)}"
+        for true, found in self.verdict.wrong_kind:
+            yield f"{self.name}: kind {described(true)} | {described(found)}"
+        for true, found in self.verdict.pairs:
+            is_told = true.sizes.get("through") is not None and found.get("through") is not None
+            if true.kind == found["kind"] == "hole" and is_told and true.sizes["through"] != found["through"]:
+                yield f"{self.name}: through {described(true)} | {described(found)}"
+
+
+class Totals:
+    """What several parts add up to."""
+
+    def __init__(self):
+        self.counts = defaultdict(lambda: dict.fromkeys(["required", "missed", "false", "found", "kind"], 0))
+        self.errors = defaultdict(list)
+        self.bounds = [0, 0]
+
+    def add(self, result):
+        of, verdict = self.counts[result.world], result.verdict
+        of["required"] += len(verdict.required)
+        of["missed"] += len(verdict.missed)
+        of["false"] += len(verdict.false)
+        of["found"] += verdict.found
+        of["kind"] += len(verdict.wrong_kind)
+        for key, values in verdict.errors.items():
+            self.errors[result.world, *key].extend(values)
+        self.bounds = [a + b for a, b in zip(self.bounds, verdict.bounds)]
+
+    def table(self):
+        lines = ["| world | required | found | false | of another kind |", "|---|---|---|---|---|"]
+        for world, of in self.counts.items():
+            found = of["required"] - of["missed"]
+            lines.append(f"| {world} | {of['required']} | {found} | {of['false']} | {of['kind']} of {of['found']} |")
+        lines += ["", "| world | kind | number | n | rms error / std | rms error, mm | median std, mm |", "|---|---|---|---|---|---|---|"]
+        for key, values in sorted(self.errors.items()):
+            error, std = np.array(values).T
+            ratio = np.sqrt(np.mean((error / std) ** 2))
+            rms = np.sqrt(np.mean(error**2))
+            lines.append(f"| {' | '.join(key)} | {len(error)} | {ratio:.2f} | {rms:.4f} | {np.median(std):.4f} |")
+        lines += ["", f"Lower bounds above the truth: {self.bounds[0]} of {self.bounds[1]}."]
+        return "\n".join(lines)
+
+
+def run(command, **more):
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, **more)
+
+
+def simulated(touchup, folder, seed, family, world, scanner):
+    """Scan, recording and true contacts of the part in a folder."""
+    sides = SIDES.get(family, "z,y,-y,x,-x")
+    options = ["--world", world] if world else []
+    options += ["--scanner", scanner] if scanner else []
+    command = [touchup, "simulate", "--truth", folder / "part.stl", "--out", folder, "--seed", seed, f"--sides={sides}", *options]
+    done = run(command)
+    if done.returncode != 0:
+        raise Failed(done.stderr)
+
+
+def refined(touchup, folder, world):
+    files = ["--scan", folder / "scan.ply", "--bag", folder / "touch.mcap", "--out", folder / "refined.ply"]
+    files += ["--features-out", folder / "features.json", "--touches-out", folder / "touches.csv"]
+    told = ["--scene", folder / "scene.yaml"] if world else ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"]
+    done = run([touchup, "refine", *files, *told, "--json"])
+    (folder / "refine.log").write_text(done.stdout + done.stderr)
+    # 4: the recordings lose messages on purpose
+    if done.returncode not in (0, 4):
+        raise Failed(done.stderr)
+    return json.loads((folder / "features.json").read_text())["features"]
+
+
+def into_part(features, folder, world):
+    """The features in the frame of the part: where a world tells the place of the scan, its error goes out again."""
+    if not world:
+        return features
+    place = json.loads((folder / "truth.json").read_text())["scan_to_space"]
+
+    def pose(of):
+        return Rotation.from_quat(of["orientation_xyzw"]), np.array(of["position_m"]) * 1e3
+
+    (true_turn, true_shift), (told_turn, told_shift) = pose(place["truth"]), pose(place["told"])
+    for feature in features:
+        point = told_turn.apply(feature["center_mm"]) + told_shift
+        feature["center_mm"] = true_turn.inv().apply(point - true_shift).tolist()
+        for name in ("axis", "direction"):
+            if name in feature:
+                feature[name] = true_turn.inv().apply(told_turn.apply(feature[name])).tolist()
+    return features
+
+
+def touched_shares(part, mesh, labels, contacts):
+    """For each feature the share of its wall that was touched."""
+    tree = cKDTree(contacts) if len(contacts) else None
+    shares = []
+    for feature in part.features:
+        faces = np.flatnonzero(np.isin(labels, feature.wall))
+        if not len(faces) or tree is None:
+            shares.append(0.0)
+            continue
+        points, _ = trimesh.sample.sample_surface(mesh.submesh([faces], append=True), 400, seed=1)
+        shares.append(float((tree.query(points)[0] < NEAR_MM).mean()))
+    return shares
+
+
+def part_run(touchup, out, seed, world, scanner):
+    """The verdict on one part, and the touched shares of its features."""
+    family, part = random_part(seed)
+    mesh, labels = part.finished()
+    folder = out / f"{seed}_{family}_{world or 'plain'}{'_' + scanner if scanner else ''}"
+    folder.mkdir(parents=True, exist_ok=True)
+    mesh.export(folder / "part.stl")
+    if not (folder / "truth_contacts.csv").exists():
+        simulated(touchup, folder, seed, family, world, scanner)
+    features = into_part(refined(touchup, folder, world), folder, world)
+    told = np.loadtxt(folder / "truth_contacts.csv", delimiter=",", skiprows=1, ndmin=2)
+    centres, contacts = told[:, 1:4], told[:, 4:7]
+    radius = np.median(np.linalg.norm(centres - contacts, axis=1))
+    shares = touched_shares(part, mesh, labels, contacts)
+    fits = [feature.entry_mm > 2 * radius + ROOM_MM for feature in part.features]
+    required = [not f.is_optional and fit and share > TOUCHED for f, fit, share in zip(part.features, fits, shares)]
+    name = f"{seed} {family} {world or 'plain'}"
+    return Result(name, world or "plain", part, shares, judge(features, part.features, required))
