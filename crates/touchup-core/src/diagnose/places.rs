@@ -122,7 +122,12 @@ impl BallFit {
         let mut told = distances.clone();
         let beyond = is_beyond.iter().filter(|is| **is).count();
         if beyond as f64 <= MOST_BEYOND_RIMS * distances.len() as f64 {
-            told = distances.iter().zip(&is_beyond).filter(|(_, is)| !**is).map(|(&distance, _)| distance).collect();
+            // beyond a rim there is no side: what is one radius away may be on the surface that goes on there, the rest says nothing
+            let seen = |(&distance, is_beyond): (&f64, &bool)| match is_beyond {
+                false => Some(distance),
+                true => Some(distance.abs()).filter(|distance| (distance - radius).abs() <= tolerance),
+            };
+            told = distances.iter().zip(&is_beyond).filter_map(seen).collect();
         }
         let below = told.iter().filter(|&&distance| distance < -tolerance).count();
         if below as f64 <= MOST_UNDER_LIDS * told.len() as f64 {

@@ -8,8 +8,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 
 use super::facets::NONE;
 use super::fit::{Cone, Surface};
-use super::grow::belongs;
-use super::primitive::{Primitive, refined};
+use super::primitive::{Primitive, belongs, refined};
 use super::scene::Parted;
 use super::segment::Segment;
 use super::walls::Wall;

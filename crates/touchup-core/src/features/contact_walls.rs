@@ -9,9 +9,8 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use super::facets::NONE;
 use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
-use super::grow::belongs;
 use super::observe::{groups, observation};
-use super::primitive::Primitive;
+use super::primitive::{Primitive, belongs};
 use super::scene::Parted;
 use super::segment::Segment;
 use crate::mesh::BoxQuery;
@@ -316,8 +315,8 @@ fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<u
     let points: Vec<Point3<f64>> = numbers.iter().map(|&at| touches[at].point).collect();
     let grid = PointGrid::of(&points, 0..points.len(), reach);
     let mut sets = DisjointSets::of(points.len());
-    for at in 0..points.len() {
-        for other in grid.near(&points[at], reach).filter(|&other| other < at) {
+    for (at, point) in points.iter().enumerate() {
+        for other in grid.near(point, reach).filter(|&other| other < at) {
             sets.join(at as u32, other as u32);
         }
     }

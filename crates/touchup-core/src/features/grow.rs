@@ -4,15 +4,11 @@
 //! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
 //! be a strip of something round: then whatever explains more of the surface is taken.
 
-use nalgebra::{Point3, Vector3};
-
 use super::facets::{Facets, NONE};
-use super::fit::Surface;
 use super::flats::{FlatPiece, Flats, SMOOTH};
 use super::marks::sort;
-use super::primitive::{NormalSpread, Primitive, cylinder_of, plane_of, refined};
+use super::primitive::{NormalSpread, Primitive, belongs, cylinder_of, plane_of, refined};
 use super::segment::{Segment, Segmentation};
-use crate::mesh::{FaceId, VertexId};
 use crate::numeric::median;
 
 /// Lengths that come with the mesh.
@@ -46,8 +42,6 @@ const SETTLED: f64 = 0.1;
 const SAMPLE: usize = 64;
 /// A region is at least so many tolerances wide.
 const LEAST_WIDTH: f64 = 12.0;
-/// A face's normal may be off that of the primitive by this much: 25°.
-const ALIKE: f64 = 0.906;
 /// A segment of which stronger ones leave less than this is dropped.
 const LEAST_LEFT: f64 = 0.3;
 /// Faces around a seed, to begin with.
@@ -428,36 +422,6 @@ impl<'a> Growing<'a> {
         }
         Segmentation { segments, of_face }
     }
-}
-
-/// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
-pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
-    let normal = match primitive {
-        // most are planes: no more is loaded and reckoned than they need
-        Primitive::Plane(plane) => {
-            let (point, normal) = (plane.point(), plane.normal());
-            let off = |vertex: VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
-            facets.mesh.corners(FaceId(face)).into_iter().all(|vertex| off(vertex) <= tolerance).then_some(normal)
-        }
-        Primitive::Cylinder(cylinder) => normal_beneath(facets, face, cylinder, tolerance),
-        Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
-    };
-    normal.is_some_and(|normal| {
-        facets.normal(face).dot(&normal) > ALIKE || {
-            // the normal of a sliver says nothing
-            let corners = facets.triangle(face);
-            let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
-            2.0 * facets.area(face) < tolerance * longest
-        }
-    })
-}
-
-/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther from it than `tolerance`, m.
-fn normal_beneath(facets: &Facets, face: u32, surface: &impl Surface, tolerance: f64) -> Option<Vector3<f64>> {
-    let own = surface.to_own();
-    let is_near = |p: &Point3<f64>| surface.distance_at(&own(p)).value.abs() <= tolerance;
-    let middle = || surface.distance_at(&own(&facets.mesh.barycentre(FaceId(face)))).normal;
-    facets.triangle(face).iter().all(is_near).then(|| surface.pose_of().rotation * middle())
 }
 
 /// The largest power of two, as its exponent, that is not above `x`, from 1 on.

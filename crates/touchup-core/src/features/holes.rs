@@ -388,6 +388,6 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         let height = (top - foot) * out;
         let is_turned = walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out));
         let foot = wall.at(foot);
-        (height > 0.0).then(|| Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
+        (height > 0.0).then_some(Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
     })
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
 use super::facets::Facets;
 use super::fit::{Cone, Cylinder, FREEDOMS, Freedom, Plane, Steps, Surface};
-use crate::mesh::FaceId;
+use crate::mesh::{FaceId, VertexId};
 use crate::numeric::{NormalEquations, tangent_basis};
 
 /// The surface of a piece of the mesh.
@@ -45,6 +45,39 @@ impl Primitive {
     pub fn plane(&self) -> Option<&Plane> {
         if let Self::Plane(plane) = self { Some(plane) } else { None }
     }
+}
+
+/// A face's normal may be off that of the primitive by this much: 25°.
+const ALIKE: f64 = 0.906;
+
+/// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
+pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
+    let normal = match primitive {
+        // most are planes: no more is loaded and reckoned than they need
+        Primitive::Plane(plane) => {
+            let (point, normal) = (plane.point(), plane.normal());
+            let off = |vertex: VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
+            facets.mesh.corners(FaceId(face)).into_iter().all(|vertex| off(vertex) <= tolerance).then_some(normal)
+        }
+        Primitive::Cylinder(cylinder) => normal_beneath(facets, face, cylinder, tolerance),
+        Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
+    };
+    normal.is_some_and(|normal| {
+        facets.normal(face).dot(&normal) > ALIKE || {
+            // the normal of a sliver says nothing
+            let corners = facets.triangle(face);
+            let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+            2.0 * facets.area(face) < tolerance * longest
+        }
+    })
+}
+
+/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther from it than `tolerance`, m.
+fn normal_beneath(facets: &Facets, face: u32, surface: &impl Surface, tolerance: f64) -> Option<Vector3<f64>> {
+    let own = surface.to_own();
+    let is_near = |p: &Point3<f64>| surface.distance_at(&own(p)).value.abs() <= tolerance;
+    let middle = || surface.distance_at(&own(&facets.mesh.barycentre(FaceId(face)))).normal;
+    facets.triangle(face).iter().all(is_near).then(|| surface.pose_of().rotation * middle())
 }
 
 /// Rows and columns of the lower triangle of a symmetric matrix.

@@ -4,9 +4,8 @@ use std::collections::BTreeSet;
 
 use super::facets::{Facets, NONE};
 use super::fit::Surface;
-use super::grow::belongs;
 use super::marks::sort;
-use super::primitive::{Primitive, plane_of};
+use super::primitive::{Primitive, belongs, plane_of};
 use crate::numeric::{DisjointSets, distinct};
 
 /// A connected piece of the mesh that one primitive explains.
