@@ -49,7 +49,7 @@ pub(super) struct Boss {
 }
 
 /// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still counts.
-const HOLE_COVERAGE: f64 = 0.6;
+const HOLE_COVERAGE: f64 = 0.56;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
 /// A shaft goes around its shoulder by at least this share of what stands on it.

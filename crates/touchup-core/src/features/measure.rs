@@ -159,7 +159,8 @@ impl<'a> Measure<'a> {
             if is_wall { q.x.abs() < half_length + room.min(0.0) } else { q.y.abs() < half_width + room }
         };
         let of_part = |segments: &[usize], is_wall: bool| {
-            let mut of_mesh = if segments.is_empty() { Vec::new() } else { self.observed.of_mesh(segments) };
+            let mut of_mesh: Vec<Observation> =
+                segments.iter().flat_map(|&number| self.observed.of_mesh_surface(number)).collect();
             of_mesh.retain(|observation| is_of(&observation.point, is_wall));
             of_mesh
         };

@@ -9,6 +9,7 @@ use super::fit::{Observation, Surface};
 use super::marks::NumberSet;
 use super::primitive::Primitive;
 use super::scene::Parted;
+use super::slots::samples;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::{PointGrid, VoxelKey, distinct, voxel_of};
 use crate::stylus::ProbedPoint;
@@ -149,6 +150,18 @@ impl<'a> Observed<'a> {
             Observation { point, offset: 0.0, sigma, group }
         };
         (0..).zip(vertices.into_iter().step_by(step)).map(observation).collect()
+    }
+
+    /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in a drawing, whose few corners may all lie at its
+    /// ends.
+    pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
+        match self.parted.rounding.filter(|_| self.parted.plane(number).is_some()) {
+            None => self.of_mesh(&[number]),
+            Some(rounding) => {
+                let point = |(group, point)| Observation { point, offset: 0.0, sigma: rounding / 6.0, group };
+                (0..).zip(samples(self.parted, number)).map(point).collect()
+            }
+        }
     }
 
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation

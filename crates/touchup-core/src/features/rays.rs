@@ -7,6 +7,9 @@ use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 /// A line is followed in so many pieces at most: a void may be narrower than any number of pieces can be.
 const MOST_PIECES: f64 = 1000.0;
 
+/// Rounding of barycentric coordinates: a line through an edge slips through between its triangles in no frame.
+const ON_EDGE: f64 = 1e-9;
+
 /// Casts rays through one mesh.
 pub(super) struct Rays<'a> {
     mesh: &'a TriMesh,
@@ -68,7 +71,7 @@ fn crossing([a, b, c]: &[Point3<f64>; 3], from: &Point3<f64>, direction: &Vector
     let along = start.cross(&ab);
     let w = direction.dot(&along) / volume;
     // a triangle seen edge-on has no volume: all of this is NaN or infinite, and outside
-    (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then(|| ac.dot(&along) / volume)
+    (v >= -ON_EDGE && w >= -ON_EDGE && v + w <= 1.0 + ON_EDGE).then(|| ac.dot(&along) / volume)
 }
 
 #[cfg(test)]

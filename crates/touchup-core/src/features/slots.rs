@@ -79,6 +79,8 @@ const ASLANT: std::ops::Range<f64> = 0.26..0.94;
 const SAME: f64 = 0.4;
 /// The axis of an end is where it should be within this share of the width.
 const ABOUT: f64 = 0.1;
+/// Lengths are the same within this share.
+const AS_LONG: f64 = 0.999;
 /// A line that starts on a wall starts this share of the width off it.
 const OFF: f64 = 1e-3;
 /// What is across is looked for up to so many diagonals away, and a void is not wider.
@@ -308,12 +310,16 @@ fn between(
     let seen = lands.into_iter().filter_map(|(land, out)| {
         opened(parted, of_face, &Opened { walls, middle, across: n, width, land, out, area })
     });
-    let longest = seen.max_by(|a, b| a.length.total_cmp(&b.length))?;
-    Some((longest, share))
+    let seen: Vec<Slot> = seen.collect();
+    let longest = seen.iter().map(|slot| slot.length).fold(0.0, f64::max);
+    // as long from both of its sides, as the neck of a T-slot is: from where it is deeper
+    let deepest = seen.into_iter().filter(|slot| slot.length > AS_LONG * longest);
+    let deepest = deepest.max_by(|a, b| a.depth.total_cmp(&b.depth))?;
+    Some((deepest, share))
 }
 
 /// Points of a segment, spread over its faces.
-fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
+pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
     let faces = &parted.segment(number).faces;
     let step = faces.len().div_ceil(SAMPLES).max(1);
     let each = (SAMPLES / faces.len().max(1)).clamp(1, 16);

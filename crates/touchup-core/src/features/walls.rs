@@ -1,5 +1,7 @@
 //! Round walls: the segments on one cylinder, or one cone, merged.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::{Point3, Vector3};
 
 use super::facets::Facets;
@@ -78,21 +80,24 @@ impl Wall {
         };
         let [e, g] = tangent_basis(&axis);
         let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
+        let mut spans = Vec::with_capacity(faces.len());
         for &face in faces {
             let corners = facets.triangle(face).map(|p| p - origin);
             let along = corners.map(|v| v.dot(&axis));
-            for part in parts_between(corners.map(|v| v.dot(&g).atan2(v.dot(&e)))) {
+            let span = span_of(corners.map(|v| v.dot(&g).atan2(v.dot(&e))));
+            spans.push(span);
+            for part in parts_between(span) {
                 along.iter().for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
             }
         }
         let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
-        let coverage = covered.len() as f64 / PARTS as f64;
+        let coverage = covered_share(spans);
         // the usual end, not the farthest: walls have ears
         let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
         let [Some(low), Some(high)] = ends else { return None };
         let ends = [low, high];
         let away = |part: usize| {
-            let (sine, cosine) = (std::f64::consts::TAU * (part as f64 + 0.5) / PARTS as f64).sin_cos();
+            let (sine, cosine) = (TAU * (part as f64 + 0.5) / PARTS as f64).sin_cos();
             e * cosine + g * sine
         };
         let is_covered = |&part: &usize| parts[part][0] <= parts[part][1];
@@ -102,7 +107,7 @@ impl Wall {
         let mut wall =
             Self { radius_at_origin, half_angle, is_concave, segments, origin, axis, ends, coverage, filled, towards };
         let slant = wall.radius() / half_angle.unwrap_or(0.0).cos();
-        let whole = std::f64::consts::TAU * slant * wall.height() * coverage;
+        let whole = TAU * slant * wall.height() * coverage;
         wall.filled = if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 };
         Some(wall)
     }
@@ -163,14 +168,54 @@ impl Wall {
     }
 }
 
-/// The parts of a turn between the corners of a face.
-fn parts_between(angles: [f64; 3]) -> impl Iterator<Item = usize> {
-    use std::f64::consts::{PI, TAU};
+/// From which to which angle the corners of a face reach, rad.
+fn span_of(angles: [f64; 3]) -> [f64; 2] {
     let from = angles[0];
     let turned = angles.map(|angle| (angle - from + PI).rem_euclid(TAU) - PI);
-    let low = turned.iter().copied().fold(0.0, f64::min) + from;
-    let high = turned.iter().copied().fold(0.0, f64::max) + from;
+    [turned.iter().copied().fold(0.0, f64::min) + from, turned.iter().copied().fold(0.0, f64::max) + from]
+}
+
+/// The share of a turn that spans cover together, but for gaps of less than a part: the same however the turn is counted.
+fn covered_share(spans: Vec<[f64; 2]>) -> f64 {
+    let begun = spans.into_iter().map(|[low, high]| (low.rem_euclid(TAU), high - low));
+    // what goes beyond the turn begins it
+    let mut spans: Vec<[f64; 2]> = begun
+        .flat_map(|(low, length)| {
+            let high = low + length;
+            [[low, high.min(TAU)], [0.0, high - TAU]]
+        })
+        .filter(|[low, high]| low < high)
+        .collect();
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let gap = TAU / PARTS as f64;
+    let (mut covered, mut until) = (0.0, spans.first().map_or(0.0, |span| span[0]));
+    for [low, high] in spans {
+        let from = if low - until < gap { until } else { low };
+        covered += (high - from).max(0.0);
+        until = until.max(high);
+    }
+    covered / TAU
+}
+
+/// The parts of a turn in a span.
+fn parts_between([low, high]: [f64; 2]) -> impl Iterator<Item = usize> {
     let size = TAU / PARTS as f64;
     let (first, last) = ((low / size).floor() as i64, (high / size).ceil() as i64);
     (first..last).map(|at| at.rem_euclid(PARTS as i64) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_that_overlap_or_go_beyond_a_turn_count_once() {
+        let degrees =
+            |spans: &[[f64; 2]]| covered_share(spans.iter().map(|span| span.map(f64::to_radians)).collect()) * 360.0;
+        assert!((degrees(&[[10.0, 40.0], [30.0, 70.0], [100.0, 120.0]]) - 80.0).abs() < 1e-9);
+        assert!((degrees(&[[10.0, 40.0], [44.0, 70.0], [76.0, 80.0]]) - 64.0).abs() < 1e-9, "a gap of 4°, one of 6°");
+        // 350° to 20°, 10° to 15° within it, −20° to −5° half within it
+        assert!((degrees(&[[350.0, 380.0], [10.0, 15.0], [-20.0, -5.0]]) - 40.0).abs() < 1e-9);
+        assert!((degrees(&[[-180.0, 0.0], [0.0, 180.0]]) - 360.0).abs() < 1e-9);
+    }
 }
