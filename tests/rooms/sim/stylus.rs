@@ -283,17 +283,17 @@ fn waterlines_go_around_every_hole_that_lets_the_ball_in() {
     let plate = Plate::default();
     let hand = PathParams::default();
     let runs = plan_waterlines(&plate, &plate.bounds(), &-Vector3::z_axis(), &hand).unwrap();
-    let top = plate.bounds().max.z;
     let features = plate.features();
     let holes: Vec<_> = features
         .iter()
         .filter_map(|feature| match feature.shape {
-            TruthShape::Hole { diameter, .. } => Some((feature.centre.xy(), diameter / 2.0)),
+            TruthShape::Hole { diameter, .. } => Some((feature.centre, diameter / 2.0)),
             _ => None,
         })
         .collect();
     assert_eq!(holes.len(), 2);
-    for (centre, radius) in holes {
+    for (opening, radius) in holes {
+        let (centre, top) = (opening.xy(), opening.z);
         let away = radius - hand.radius + hand.lean;
         let is_in = |p: &Point3<f64>| p.z < top && (p.xy() - centre).norm() < radius;
         let of_hole: Vec<&Stroke> =

@@ -82,7 +82,7 @@ pub(super) struct BallFit {
     pub distance: f64,
     /// median deviation from that, m
     pub scatter: f64,
-    /// share of them within the tolerance
+    /// share within the tolerance, of those that are not below the surface
     pub share: f64,
     /// of each centre, m
     pub distances: Vec<f64>,
@@ -119,22 +119,16 @@ impl BallFit {
             normals.push(normal);
             is_beyond.push(is_on_rim(scan, &hit));
         }
-        let mut told = distances.clone();
-        let beyond = is_beyond.iter().filter(|is| **is).count();
-        if beyond as f64 <= MOST_BEYOND_RIMS * distances.len() as f64 {
-            // beyond a rim there is no side: what is one radius away may be on the surface that goes on there, the rest says nothing
-            let seen = |(&distance, is_beyond): (&f64, &bool)| match is_beyond {
-                false => Some(distance),
-                true => Some(distance.abs()).filter(|distance| (distance - radius).abs() <= tolerance),
-            };
-            told = distances.iter().zip(&is_beyond).filter_map(seen).collect();
-        }
-        let below = told.iter().filter(|&&distance| distance < -tolerance).count();
-        if below as f64 <= MOST_UNDER_LIDS * told.len() as f64 {
-            told.retain(|&distance| distance >= -tolerance);
-        }
-        let within = told.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
-        let share = within as f64 / told.len().max(1) as f64;
+        let within = distances.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
+        let below = distances.iter().filter(|&&distance| distance < -tolerance).count();
+        let is_lid = below as f64 <= MOST_UNDER_LIDS * distances.len() as f64;
+        let count = distances.len() - if is_lid { below } else { 0 };
+        let share = within as f64 / count.max(1) as f64;
+        // beyond a rim there is no side
+        let is_rim = is_beyond.iter().filter(|is| **is).count() as f64 <= MOST_BEYOND_RIMS * distances.len() as f64;
+        let is_told = |distance: f64, is_beyond: bool| !(is_lid && distance < -tolerance || is_rim && is_beyond);
+        let told = distances.iter().zip(&is_beyond).filter(|&(&distance, &is_beyond)| is_told(distance, is_beyond));
+        let mut told: Vec<f64> = told.map(|(&distance, _)| distance).collect();
         let distance = median(&mut told).unwrap_or(f64::INFINITY);
         told.iter_mut().for_each(|x| *x = (*x - distance).abs());
         let scatter = median(&mut told).unwrap_or(f64::INFINITY);
