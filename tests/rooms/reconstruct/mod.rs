@@ -3,7 +3,6 @@ mod closed;
 mod contour;
 mod cost;
 mod double_contact;
-mod free_space;
 mod region;
 mod tips;
 mod uncertainty;
