@@ -48,8 +48,8 @@ const BESIDE: f64 = 0.15;
 const OVER_END: f64 = 0.3;
 /// … and its normal leans towards it by more than this, rad: 15°.
 const OVER_END_LEAN: f64 = 0.26;
-/// Leans that are tried in turn, sines: 6°, 9°, 12°.
-const LEANS: [f64; 3] = [0.1, 0.15, 0.2];
+/// Leans that are tried in turn, sines: 9°, which friction leaves, and 12°.
+const LEANS: [f64; 2] = [0.15, 0.2];
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 
