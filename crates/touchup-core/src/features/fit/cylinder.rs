@@ -6,6 +6,9 @@ use super::surface::{AXIS, CENTRE, RADIUS, check_size, pose_along, radial, side}
 use super::{Distance, FREEDOMS, Fit, FitError, Surface};
 use crate::numeric::mean;
 
+/// A direction is along the axis when the square of its sine is no more than rounding leaves.
+const ALONG: f64 = 1e-24;
+
 /// A cylinder without ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
@@ -68,7 +71,7 @@ impl Cylinder {
         // |p + t d|² = R²
         let (a, b, c) = (d.norm_squared(), p.dot(&d), p.norm_squared() - self.radius * self.radius);
         let square = b * b - a * c;
-        (a > 0.0 && square >= 0.0).then(|| (square.sqrt() - b) / a)
+        (a > ALONG && square >= 0.0).then(|| (square.sqrt() - b) / a)
     }
 }
 
