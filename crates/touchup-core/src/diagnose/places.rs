@@ -126,12 +126,12 @@ impl BallFit {
         let share = within as f64 / count.max(1) as f64;
         // beyond a rim there is no side
         let is_rim = is_beyond.iter().filter(|is| **is).count() as f64 <= MOST_BEYOND_RIMS * distances.len() as f64;
-        let is_told = |distance: f64, is_beyond: bool| !(is_lid && distance < -tolerance || is_rim && is_beyond);
-        let told = distances.iter().zip(&is_beyond).filter(|&(&distance, &is_beyond)| is_told(distance, is_beyond));
-        let mut told: Vec<f64> = told.map(|(&distance, _)| distance).collect();
-        let distance = median(&mut told).unwrap_or(f64::INFINITY);
-        told.iter_mut().for_each(|x| *x = (*x - distance).abs());
-        let scatter = median(&mut told).unwrap_or(f64::INFINITY);
+        let has_side = |distance: f64, is_beyond: bool| !(is_lid && distance < -tolerance || is_rim && is_beyond);
+        let sided = distances.iter().zip(&is_beyond).filter(|&(&distance, &is_beyond)| has_side(distance, is_beyond));
+        let mut sided: Vec<f64> = sided.map(|(&distance, _)| distance).collect();
+        let distance = median(&mut sided).unwrap_or(f64::INFINITY);
+        sided.iter_mut().for_each(|x| *x = (*x - distance).abs());
+        let scatter = median(&mut sided).unwrap_or(f64::INFINITY);
         Self { distance, scatter, share, distances, normals }
     }
 

@@ -13,7 +13,7 @@ use super::observe::{groups, observation};
 use super::primitive::{Primitive, belongs};
 use super::scene::Parted;
 use super::segment::Segment;
-use crate::mesh::BoxQuery;
+use crate::mesh::{BoxQuery, FaceId};
 use crate::numeric::{DisjointSets, PointGrid, VoxelKey, distinct, mean, median, spreads, tangent_basis, voxel_of};
 use crate::stylus::ProbedPoint;
 
@@ -42,7 +42,7 @@ const RADIAL: f64 = 0.82;
 const PARTS: usize = 24;
 /// A cylinder was touched over at least this share of a turn.
 const TURN: f64 = 0.42;
-/// … by at least so many contacts, with no gap in it of more than this share of a turn where it is a bore.
+/// … by at least so many contacts; a flat wall by as many.
 const LEAST: usize = 12;
 /// Contacts from which a flat wall is tried, of one group.
 const STARTS: usize = 40;
@@ -51,7 +51,7 @@ const FLAT_RADII: f64 = 1.5;
 const WIDE_RADII: f64 = 0.25;
 /// No more of a flat wall than this share is round in the mesh.
 const MOST_ROUND: f64 = 0.3;
-/// Walls of one kind in one group.
+/// Most walls of one kind in one group.
 const MOST_IN_GROUP: usize = 6;
 /// Radii between these many radii of the ball.
 const RADII: [f64; 2] = [1.02, 40.0];
@@ -64,7 +64,7 @@ const SAME: f64 = 0.12;
 /// is blurred, and steps of a hole or shaft differ by more.
 const SAME_WALL: f64 = 0.15;
 const SAME_WALL_OF_BALL: f64 = 0.35;
-/// A segment is told to be as exact as this share of the ball's radius.
+/// Tolerance of the segment of such a wall, as a share of the ball's radius.
 const TOLERANCE: f64 = 0.05;
 
 /// A cylinder and the contacts on it.
@@ -163,7 +163,7 @@ fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
     let primitive = Primitive::Cylinder(found.surface);
     let [low, high] = [found.ends[0] - MESH_BEYOND * radius, found.ends[1] + MESH_BEYOND * radius];
     let is_of = |face: u32| {
-        let along = (parted.facets.mesh.barycentre(crate::mesh::FaceId(face)) - centre).dot(&axis);
+        let along = (parted.facets.mesh.barycentre(FaceId(face)) - centre).dot(&axis);
         (low..=high).contains(&along) && belongs(&parted.facets, face, &primitive, MESH_OFF * radius)
     };
     let mut faces: Vec<u32> = query.faces.iter().map(|face| face.0).filter(|&face| is_of(face)).collect();
@@ -454,10 +454,9 @@ const AXIS_SIGMA: f64 = 0.05;
 fn is_same(one: &ContactCylinder, other: &ContactCylinder) -> bool {
     let (a, b) = (&one.surface, &other.surface);
     let v = b.center() - a.center();
-    let along = v.dot(&a.axis());
-    let aside = (v - a.axis() * along).norm();
-    let is_beside = along + other.ends[1].abs().max(other.ends[0].abs()) > one.ends[0]
-        && along - other.ends[1].abs().max(other.ends[0].abs()) < one.ends[1];
+    let aside = v.cross(&a.axis()).norm();
+    let along = other.ends.map(|t| (v + b.axis() * t).dot(&a.axis()));
+    let is_beside = along[0].max(along[1]) > one.ends[0] && along[0].min(along[1]) < one.ends[1];
     a.concave == b.concave
         && is_beside
         && a.axis().dot(&b.axis()).abs() > ALIKE

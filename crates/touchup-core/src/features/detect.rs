@@ -59,13 +59,13 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
-    let is_told = |slot: &Slot, feature: &Feature| {
+    let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
         let is_shut = slot.floor.is_some() || slot.ends.iter().all(Option::is_some);
         is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
     };
-    let told = slots.iter().map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
-    features.extend(told.filter(|(slot, feature)| is_told(slot, feature)).map(|(_, feature)| feature));
+    let measured = slots.iter().map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
+    features.extend(measured.filter(|(slot, feature)| is_reported(slot, feature)).map(|(_, feature)| feature));
     features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
     let bosses = bosses(&parted, &walls);
     features.extend(bosses.iter().map(|boss| boss_feature(&measure, &walls, boss)));
@@ -82,10 +82,10 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
 }
 
-/// A cylinder is worth telling when it covers more than this share of a turn: less is the rounding of an edge.
+/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge.
 const ROUNDED_EDGE: f64 = 0.3;
 
-/// Whether a wall has the material inside and is large enough to be told of.
+/// Whether a wall has the material inside and is large enough to be reported.
 fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     let area: f64 = wall.segments.iter().map(|&number| parted.segment(number).area).sum();
     let is_large = area > LEAST_PLANE * parted.diagonal * parted.diagonal;
@@ -164,16 +164,14 @@ impl AxisEnd {
         let on_plane = |number: usize| {
             let fitted = measure.plane(number)?;
             let place = fitted.met(point, axis)?;
-            let own_std = fitted.confirmed().and_then(|fit| fit.own_std_at(&place.value));
-            Some((place, own_std))
+            Some((fitted.own_std_at(&place.value), place))
         };
         let on_shaft = |number: usize| {
             let fitted = measure.shaft(number)?;
             let place = fitted.met(point, axis)?;
-            let own_std = fitted.confirmed().and_then(|fit| fit.own_std_at(&place.value));
-            Some((place, own_std))
+            Some((fitted.own_std_at(&place.value), place))
         };
-        let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number))).map(|(place, own_std)| {
+        let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number))).map(|(own_std, place)| {
             let [common, shift] = measure.observed.systematic(&place.touches);
             Self { place, own_std, systematic: common.hypot(shift) }
         });

@@ -237,22 +237,29 @@ impl<'a> Measure<'a> {
 impl Fitted<Plane> {
     /// Where a line meets the plane, m; its uncertainty is along the normal.
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
-        let value = from + direction * self.surface.along(from, direction)?;
-        let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Some(Measured { value, std, touches: self.touches.clone(), ..Measured::default() })
+        Some(self.place(from + direction * self.surface.along(from, direction)?))
     }
 }
 
 impl Fitted<Cylinder> {
     /// Where a line leaves the cylinder, m; its uncertainty is along the normal there.
     pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
-        let value = from + direction * self.surface.exit(from, direction)?;
-        let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Some(Measured { value, std, touches: self.touches.clone(), ..Measured::default() })
+        Some(self.place(from + direction * self.surface.exit(from, direction)?))
     }
 }
 
 impl<S: Surface> Fitted<S> {
+    /// A place on the surface, m; its uncertainty is along the normal.
+    fn place(&self, value: Point3<f64>) -> Measured<Point3<f64>> {
+        let std = self.confirmed().and_then(|fit| fit.std_at(&value));
+        Measured { value, std, touches: self.touches.clone(), ..Measured::default() }
+    }
+
+    /// The standard deviation at a place without what all touches have in common, m.
+    pub fn own_std_at(&self, place: &Point3<f64>) -> Option<f64> {
+        self.confirmed().and_then(|fit| fit.own_std_at(place))
+    }
+
     /// The fit, where its standard deviations are those of the surface.
     pub fn confirmed(&self) -> Option<&Fit<S>> {
         self.fit.as_ref().filter(|_| self.is_confirmed)

@@ -76,18 +76,6 @@ impl Cylinder {
 }
 
 impl Fit<Cylinder> {
-    /// Standard deviation of the distance of `point` from the surface, m; `None` where it is not fixed.
-    pub(crate) fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
-        let (_, by) = self.surface.derivatives(point);
-        self.std_of(&by)
-    }
-
-    /// As [`Self::std_at`], without what all observations have in common.
-    pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
-        let (_, by) = self.surface.derivatives(point);
-        self.own_std_of(&by)
-    }
-
     /// Root mean square distance across the axis by which a place on it may be off, m.
     pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
         let height = self.surface.pose_of.inverse_transform_point(at).z;

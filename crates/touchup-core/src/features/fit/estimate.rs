@@ -1,6 +1,6 @@
 //! The result of a fit: a surface, and how well each of its numbers is known.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::solver::FreedomMatrix;
 use super::{Freedom, Steps, Surface};
@@ -50,6 +50,18 @@ impl<M: Surface> Fit<M> {
     /// As [`Self::std_of`], without what all observations have in common.
     pub(crate) fn own_std_of(&self, by: &Steps) -> Option<f64> {
         self.std_in(&self.own_covariance, by)
+    }
+
+    /// Standard deviation of the surface along its normal at a point of it given in O, m; `None` where it is not fixed.
+    pub fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.std_of(&by)
+    }
+
+    /// As [`Self::std_at`], without what all observations have in common.
+    pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
+        let (_, by) = self.surface.derivatives(point);
+        self.own_std_of(&by)
     }
 
     fn std_in(&self, covariance: &FreedomMatrix, by: &Steps) -> Option<f64> {

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::surface::pose_along;
-use super::{Distance, FREEDOMS, Fit, FitError, Surface};
+use super::{Distance, FREEDOMS, FitError, Surface};
 use crate::numeric::mean;
 
 const NORMAL: Option<&str> = Some("direction of the normal");
@@ -63,19 +63,5 @@ impl Surface for Plane {
 
     fn check(&self) -> Result<(), FitError> {
         Ok(())
-    }
-}
-
-impl Fit<Plane> {
-    /// Standard deviation of the plane along its normal at a point of it given in O, m.
-    pub fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
-        let (_, by) = self.surface.derivatives(point);
-        self.std_of(&by)
-    }
-
-    /// As [`Self::std_at`], without what all observations have in common.
-    pub(crate) fn own_std_at(&self, point: &Point3<f64>) -> Option<f64> {
-        let (_, by) = self.surface.derivatives(point);
-        self.own_std_of(&by)
     }
 }
