@@ -153,7 +153,7 @@ fn closed_holes_open() {
 }
 
 /// A sheet of 40 mm × 40 mm at z = 0, in triangles of 2 mm.
-fn sheet() -> TriMesh {
+pub fn sheet() -> TriMesh {
     let corner = |i: u32| Point3::new(f64::from(i % 21) * 2e-3, f64::from(i / 21) * 2e-3, 0.0);
     let square = |i: u32| [[i, i + 1, i + 22], [i, i + 22, i + 21]];
     let faces = (0..20).flat_map(|row| (0..20).flat_map(move |column| square(21 * row + column)));

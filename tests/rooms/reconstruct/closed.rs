@@ -16,8 +16,8 @@ use crate::soundness::soundness;
 const RADIUS: f64 = 1.5e-3;
 const STIFFNESS: f64 = 20e3;
 
-/// A cube of 20 mm, its faces halved three times.
-fn cube() -> TriMesh {
+/// A cube of 20 mm around the origin, its faces halved three times.
+pub fn cube() -> TriMesh {
     let half = 10e-3;
     let corner = |i: u32| Point3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { half } else { -half }));
     let squares = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];

@@ -9,7 +9,7 @@ use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
-/// Steps towards the zero of the touched field, at most: on a plane one is enough, at an edge it takes some more.
+/// Steps towards the zero of a field, at most: on a plane one is enough, at an edge it takes some more.
 const STEPS: usize = 8;
 /// A value of less than this share of the step is zero.
 const ENOUGH: f64 = 1e-3;
@@ -33,23 +33,23 @@ pub(in crate::reconstruct) struct Crossings {
 
 impl Crossings {
     /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
-    /// the values at the ends.
+    /// the values at the ends, and where the ball was there, on its surface.
     pub fn at(&mut self, grid: &ReconstructionGrid, evidence: &Evidence<'_>, edge: &Edge) -> Crossing {
         let ends = [edge.node, edge.end()];
         let [Some(a), Some(b)] = ends.map(|node| grid.nodes.get(&node)) else {
             return between(grid, edge, [0.0; 2]);
         };
-        let values = [a.value, b.value];
-        if [a, b].iter().any(|state| state.source != Source::Touch) {
-            return between(grid, edge, values);
-        }
-        let renewals = [a.renewal, b.renewal];
+        let (values, renewals) = ([a.value, b.value], [a.renewal, b.renewal]);
         if let Some((_, known)) = self.known.get(edge).filter(|(of, _)| *of == renewals) {
             return *known;
         }
+        let is_touched = [a, b].iter().all(|state| state.source == Source::Touch);
         let [a, b] = ends.map(|node| grid.lattice.position(node));
-        let crossing =
-            of_touches(evidence, [&a, &b], values, &mut self.scratch).unwrap_or_else(|| between(grid, edge, values));
+        let touched = if is_touched { of_touches(evidence, [&a, &b], values, &mut self.scratch) } else { None };
+        let crossing = touched.unwrap_or_else(|| {
+            let inner = if values[0] < 0.0 { &a } else { &b };
+            out_of_free_space(evidence, between(grid, edge, values), inner)
+        });
         self.known.insert(*edge, (renewals, crossing));
         crossing
     }
@@ -71,13 +71,45 @@ fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
     if at_a == at_b { 0.5 } else { (at_a / (at_a - at_b)).clamp(0.0, 1.0) }
 }
 
-/// The crossing of the touched field between two points at which its values differ in sign, by false position (Illinois).
-/// `None` where the field is discontinuous between two surfaces: the gradient of neither is that of the step between them.
+/// A crossing that lies where the ball was, moved to where the ball ended on the way into the material: the values at the nodes
+/// keep out of free space, a straight line between them does not.
+///
+/// - `inner`: the end of the edge that is in the material.
+fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3<f64>) -> Crossing {
+    let depth = |x: &Point3<f64>| evidence.free_depth(x).map(|(depth, _)| depth);
+    let depths = [&crossing.point, inner].map(depth);
+    let [Some(here @ 0.0..), Some(at_inner @ ..0.0)] = depths else { return crossing };
+    let field = |x: &Point3<f64>| {
+        let (depth, centre) = evidence.free_depth(x)?;
+        let outward = direction(&(centre - x)).filter(|_| evidence.free_space.is_of_ball());
+        Some((depth, outward.unwrap_or(crossing.normal)))
+    };
+    zero_between([&crossing.point, inner], [here, at_inner], field).unwrap_or(crossing)
+}
+
+/// The crossing of the touched field between two points at which its values differ in sign. `None` where the field is
+/// discontinuous between two surfaces: the gradient of neither is that of the step between them.
 fn of_touches(
     evidence: &Evidence<'_>,
     [a, b]: [&Point3<f64>; 2],
     values: [f64; 2],
     scratch: &mut FieldScratch,
+) -> Option<Crossing> {
+    let crossing = zero_between([a, b], values, |x| {
+        let here = evidence.touched(x, None, scratch)?;
+        Some((here.value, here.gradient))
+    })?;
+    let rises = crossing.normal.dot(&(b - a)) > 0.0;
+    (rises == (values[1] > values[0])).then_some(crossing)
+}
+
+/// The zero of a field between two points at which its values differ in sign, by false position (Illinois).
+///
+/// - `field`: value, m, and unit gradient at a point.
+fn zero_between(
+    [a, b]: [&Point3<f64>; 2],
+    values: [f64; 2],
+    mut field: impl FnMut(&Point3<f64>) -> Option<(f64, Vector3<f64>)>,
 ) -> Option<Crossing> {
     let mut ends = [(0.0, values[0]), (1.0, values[1])];
     let mut last = None;
@@ -85,24 +117,22 @@ fn of_touches(
     for _ in 0..STEPS {
         let share = ends[0].0 + (ends[1].0 - ends[0].0) * share_of(ends.map(|(_, value)| value));
         let point = a + (b - a) * share;
-        let here = evidence.touched(&point, None, scratch)?;
-        if best.is_none_or(|(least, _)| here.value.abs() < least) {
-            best = Some((here.value.abs(), Crossing { point, normal: here.gradient }));
+        let (value, normal) = field(&point)?;
+        if best.is_none_or(|(least, _)| value.abs() < least) {
+            best = Some((value.abs(), Crossing { point, normal }));
         }
-        if here.value.abs() < ENOUGH * (b - a).norm() {
+        if value.abs() < ENOUGH * (b - a).norm() {
             break;
         }
-        let side = usize::from((here.value < 0.0) != (values[0] < 0.0));
-        ends[side] = (share, here.value);
+        let side = usize::from((value < 0.0) != (values[0] < 0.0));
+        ends[side] = (share, value);
         if last == Some(side) {
             // the other end has stayed: the field bends
             ends[1 - side].1 /= 2.0;
         }
         last = Some(side);
     }
-    let (_, crossing) = best?;
-    let rises = crossing.normal.dot(&(b - a)) > 0.0;
-    (rises == (values[1] > values[0])).then_some(crossing)
+    best.map(|(_, crossing)| crossing)
 }
 
 /// Slope of the values at a node, of any length: by central differences, one-sided where a neighbour is missing.

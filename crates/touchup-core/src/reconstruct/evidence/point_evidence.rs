@@ -11,6 +11,11 @@ use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
 
+/// Values are cut off at ± this many cells: far from the surface only the sign matters.
+const WIDEST: f64 = 2.7;
+/// The scan goes straight on beyond an open rim for this many cells: up to the corners of those that the rim runs through.
+const RIM_REACH: f64 = 1.732;
+
 /// How each kind of evidence is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvidenceParams {
@@ -65,6 +70,8 @@ pub enum Source {
     Nothing,
     /// nothing, deep inside or far outside the scan: to be filled, with a pull towards the scan
     Far,
+    /// nothing, just beyond an open rim of the scan: it goes straight on
+    Rim,
     /// nothing, beyond an open rim of the scan: the surface ends here
     Beyond,
 }
@@ -114,16 +121,21 @@ impl NodeState {
 
     /// Whether nothing is known here, so that the value is filled in.
     pub fn is_open_question(&self) -> bool {
-        matches!(self.source, Source::Nothing | Source::Far)
+        matches!(self.source, Source::Nothing | Source::Far | Source::Rim)
     }
 
     /// Whether the skin differs from the scan here.
     pub fn is_changed(&self) -> bool {
         match self.source {
             Source::Touch | Source::Both | Source::Nothing => true,
-            Source::Far => (self.value < 0.0) != (self.scan < 0.0),
+            Source::Far | Source::Rim => self.is_turned(),
             Source::Scan | Source::Beyond => false,
         }
+    }
+
+    /// Whether it is on the other side of the skin than in the scan.
+    pub fn is_turned(&self) -> bool {
+        (self.value < 0.0) != (self.scan < 0.0)
     }
 
     /// Whether it shows another surface than `other`, by more than `slack` (m).
@@ -164,12 +176,12 @@ pub(crate) struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
-    /// The field at `x` (m, in O), with the scan's part in `scan`, and cut off at ± `widest` (m).
+    /// The field at `x` (m, in O), a node of a lattice of `pitch` (m), with the scan's part in `scan`.
     pub(in crate::reconstruct) fn beside(
         &self,
         scan: &ScanDistance,
         x: &Point3<f64>,
-        widest: f64,
+        pitch: f64,
         scratch: &mut FieldScratch,
     ) -> NodeState {
         let touched = self.touched(x, Some(scan), scratch);
@@ -187,10 +199,19 @@ impl Evidence<'_> {
         if let Some(touched) = touched.filter(|_| is_corner) {
             (value, source) = (touched.value, Source::Touch);
         }
+        let mut straight = touched.and_then(|touched| self.straight_on(&touched, scan));
         if scan.is_on_rim && !matches!(source, Source::Touch | Source::Both) {
-            source = Source::Beyond;
+            let is_just_beyond = scan.value.abs() < RIM_REACH * pitch;
+            source = match swept_depth > 0.0 {
+                _ if is_just_beyond => Source::Rim,
+                true => Source::Nothing,
+                false => Source::Beyond,
+            };
+            if is_just_beyond {
+                straight = Some(((x - scan.foot).dot(&scan.normal), 1.0));
+            }
         }
-        let straight = touched.and_then(|touched| self.straight_on(&touched, scan));
+        let widest = WIDEST * pitch;
         let is_swept = source != Source::Touch && swept_depth > 0.0;
         let least = if is_swept { swept_depth.min(widest) } else { f64::NEG_INFINITY };
         let value = value.clamp(-widest, widest).max(least);
@@ -332,11 +353,16 @@ impl Evidence<'_> {
         self.free_space.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
     }
 
+    /// How deep `x` lies in the space that the ball went through, m, and where it was then; `None` far from there.
+    pub(in crate::reconstruct) fn free_depth(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
+        let (distance, centre) = self.free_space.nearest(x)?;
+        Some(((1.0 - SWEPT_MARGIN) * self.params.radius - distance, centre))
+    }
+
     /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its path here freely.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
-        let Some((distance, centre)) = self.free_space.nearest(x) else { return (f64::NEG_INFINITY, false) };
-        let depth = p.radius - SWEPT_MARGIN * p.radius - distance;
+        let Some((depth, centre)) = self.free_depth(x) else { return (f64::NEG_INFINITY, false) };
         if depth <= 0.0 {
             return (depth, false);
         }

@@ -68,8 +68,6 @@ pub(in crate::reconstruct) struct ReconstructionGrid {
     scratch: FieldScratch,
 }
 
-/// Values are cut off at ± this many cells: far from the surface only the sign matters.
-const WIDEST: f64 = 2.7;
 /// A distance field changes by no more than the distance between two points: between neighbours by a pitch, and by noise beyond.
 const LARGEST_STEP: f64 = 1.1;
 /// Nodes within this many radii of a contact are looked at.
@@ -254,14 +252,15 @@ impl ReconstructionGrid {
     }
 
     fn evaluate(&mut self, evidence: &Evidence<'_>, node: LatticeNode, scan: &ScanDistance) -> NodeState {
-        let widest = WIDEST * self.lattice.pitch;
-        evidence.beside(scan, &self.lattice.position(node), widest, &mut self.scratch)
+        evidence.beside(scan, &self.lattice.position(node), self.lattice.pitch, &mut self.scratch)
     }
 
     /// Whether the skin in a cell is not the scan.
     pub fn is_in_region(&self, cell: LatticeNode) -> bool {
-        self.can_take(cell)
-            && (0..8).any(|corner| self.nodes.get(&node_at(cell, corner)).is_some_and(NodeState::is_changed))
+        let corners = || (0..8).filter_map(|corner| self.nodes.get(&node_at(cell, corner)));
+        let is_on_rim = corners().any(|state| state.source == Source::Rim);
+        let is_other = if is_on_rim { NodeState::is_turned } else { NodeState::is_changed };
+        self.can_take(cell) && corners().any(is_other)
     }
 
     /// Whether the field is known at all corners of a cell that is not to stay open.

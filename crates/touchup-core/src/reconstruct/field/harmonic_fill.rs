@@ -227,7 +227,7 @@ fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool 
     let mut material = 0;
     for corner in 0..8 {
         let Some(state) = grid.nodes.get(&node_at(cell, corner)) else { return false };
-        if !state.is_open_question() {
+        if !state.is_open_question() || state.source == Source::Rim {
             return false;
         }
         material += u8::from(state.value < 0.0);
