@@ -161,7 +161,7 @@ pub fn sheet() -> TriMesh {
 }
 
 /// The `at`-th sample of a tip with its centre at `p_mm`, pressed upwards with `newtons`.
-fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
+pub fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
     let [x, y, z] = p_mm.map(|x| x * 1e-3);
     let wrench = Wrench { force: Vector3::z() * newtons, torque: Vector3::zeros() };
     Sample { stamp_ns: at as i64 * 1_000_000, pose_ot: Isometry3::translation(x, y, z), wrench }

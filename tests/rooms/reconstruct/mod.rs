@@ -3,6 +3,7 @@ mod closed;
 mod contour;
 mod cost;
 mod double_contact;
+mod fill;
 mod free_space;
 mod region;
 mod tips;

@@ -156,6 +156,11 @@ const ENDS_FROM: f64 = 0.25;
 const ENDS_MARGIN: f64 = 0.05;
 const ENDS_SIGMAS: f64 = 2.0;
 
+/// Farther behind the scan by each of these times its distance …
+const AWAY: [f64; 3] = [2.0, 6.0, 18.0];
+/// … all of the scan is as far away as its foot, to this share: nothing else of it is there.
+const ALONE: f64 = 0.7;
+
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Evidence<'a> {
@@ -210,6 +215,10 @@ impl Evidence<'_> {
             if is_just_beyond {
                 straight = Some(((x - scan.foot).dot(&scan.normal), 1.0));
             }
+        }
+        // the scan is used here for its side alone, which means nothing behind the part
+        if source == Source::Far && swept_depth <= 0.0 && self.is_behind_part(scan, x, scratch) {
+            source = Source::Beyond;
         }
         let widest = WIDEST * pitch;
         let is_swept = source != Source::Touch && swept_depth > 0.0;
@@ -299,6 +308,21 @@ impl Evidence<'_> {
             return (if is_wall { scan.value.max(touched.value) } else { scan.value }, Source::Both);
         }
         if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
+    }
+
+    /// Whether a point out of reach of contacts that is behind the scan is behind the part: a radius nearer to the scan it is in front of a touched
+    /// surface that faces away from there, and farther away from both there is no other scan.
+    fn is_behind_part(&self, scan: &ScanDistance, x: &Point3<f64>, scratch: &mut FieldScratch) -> bool {
+        let Some(towards) = direction(&(scan.foot - x)).filter(|_| scan.value < 0.0) else { return false };
+        let nearer = x + towards * self.params.radius;
+        let touched = self.params.field.at(self.contacts, &nearer, scratch);
+        if !touched.is_some_and(|touched| touched.value > 0.0 && touched.gradient.dot(&towards) < -ALIKE) {
+            return false;
+        }
+        AWAY.iter().all(|away| {
+            let (beyond, farther) = (x + towards * (away * scan.value), (1.0 + away) * -scan.value);
+            self.tree.closest(self.scan, &beyond, ALONE * farther).is_none()
+        })
     }
 
     /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there, and not out

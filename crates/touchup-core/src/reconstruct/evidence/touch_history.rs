@@ -18,7 +18,7 @@ use crate::stylus::{STROKE_PAUSE_NS, TipPlace, TouchState};
 const REFUTED_DEPTH: f64 = 0.133;
 /// Where a contact is relocated, the ball has been nearer than this to the earlier surface, in radii.
 const FORGOTTEN: f64 = 1.1;
-/// A contact farther outside of the scan than this belongs to something else, in radii.
+/// A contact farther outside of the scan than this belongs to something else, in radii; so does one so far out of the box around it.
 const OUTSIDE: f64 = 4.0;
 /// Normals within this many radii …
 const FAN_WIDTH: f64 = 0.4;
@@ -155,9 +155,9 @@ fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> Cell
     beside
 }
 
-/// Whether a contact is so far outside that the part of the scan cannot have been touched there. Below a scan without sides
-/// it may be in a hole, but not beyond its rim.
+/// Whether a contact is so far outside that the part of the scan cannot have been touched there. Beyond an open rim the scan has no
+/// outside: there it may be on what was not scanned, below a scan without sides or in a hole of it, but not beyond the box around it.
 fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
     let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
-    ScanDistance::at(scan, tree, p).is_none_or(|scan| scan.value > reach || !is_within && scan.is_on_rim)
+    ScanDistance::at(scan, tree, p).is_none_or(|scan| if scan.is_on_rim { !is_within } else { scan.value > reach })
 }
