@@ -6,17 +6,17 @@
 //! rigid stylus, so a tip of compliance C makes it read centre − C F
 //! ([`TipBending`]).
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
 use super::ball::BallContact;
 use super::bending::TipBending;
 use super::error::{SimError, not_negative, positive, up_to};
-use super::path::Stroke;
+use super::path::{Stroke, free};
 use super::random::{Drift, SmoothField};
 use super::sensor::{Moment, Sensor, SensorParams, TICK};
-use super::surface::Surface;
+use super::surface::{Bounds, Surface};
 use super::tip::SimTip;
 use touchup_core::numeric::turned_to;
 use touchup_core::stylus::{Message, TipShape};
@@ -106,6 +106,14 @@ const CREEP: f64 = 1e-3;
 /// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times what it should take.
 const PATIENCE: f64 = 0.5;
 const PATIENCE_FACTOR: f64 = 2.0;
+/// A ball that is led freely is caught when it reaches so many points in a row not in time.
+const CAUGHT: usize = 3;
+/// A way out of where the ball is caught is looked at in steps of this share of its radius …
+const LOOK: f64 = 0.2;
+/// … and may come nearer to the surface than the ball by this, m: it touches where it is caught.
+const GRAZE: f64 = 1e-6;
+/// On the way around the part it turns by no more than this at once, rad.
+const BEND: f64 = 0.8;
 
 /// Slow motions of the hand.
 struct Hand {
@@ -167,20 +175,74 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
         firmness: 0.0,
         moments: Vec::new(),
     };
-    path.iter().for_each(|stroke| leading.follow(stroke));
+    let mut is_caught = false;
+    for stroke in path {
+        if is_caught {
+            let Some(first) = stroke.points.first().filter(|p| stroke.press.is_none() && leading.is_beside(p)) else {
+                continue;
+            };
+            leading.go_around_to(first);
+        }
+        is_caught = !leading.follow(stroke);
+    }
     let moments = leading.moments;
     let messages = Sensor::new(&params.sensor, params.bending(), seed).record(&moments);
     Ok(Touch { messages, moments })
 }
 
 impl Leading<'_> {
-    /// Goes along one stroke, starting wherever the ball is.
-    fn follow(&mut self, stroke: &Stroke) {
+    /// Whether a point is outside of the box around the surface.
+    fn is_beside(&self, p: &Point3<f64>) -> bool {
+        let Bounds { min, max } = self.surface.bounds();
+        min.inf(p) != min || max.sup(p) != max
+    }
+
+    /// Takes the ball off the part, and around it to a point outside of the box around the surface.
+    fn go_around_to(&mut self, point: &Point3<f64>) {
+        let bounds = self.surface.bounds();
+        let away = bounds.size().norm() / 2.0 + 4.0 * self.params.radius;
+        let (middle, out) = (bounds.centre(), self.way_out(away));
+        let from = (self.centre + out * (2.0 * away) - middle).normalize();
+        let to = (point - middle).try_normalize(0.0).unwrap_or(out);
+        let mut points = vec![middle + from * (2.0 * away)];
+        // to the opposite side any way around is as short
+        let aside = Unit::new_normalize(turned_to(&from) * Vector3::x());
+        let turn = UnitQuaternion::rotation_between(&from, &to)
+            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&aside, std::f64::consts::PI));
+        let count = (turn.angle() / BEND).ceil().max(1.0) as usize;
+        points.extend((1..=count).map(|i| middle + turn.powf(i as f64 / count as f64) * from * (2.0 * away)));
+        points.push(*point);
+        self.follow(&free(points));
+    }
+
+    /// A direction in which the ball can leave straight for `away` (m); along the shaft where there is none.
+    fn way_out(&self, away: f64) -> Vector3<f64> {
+        let shaft = self.upright * Vector3::z();
+        let pushed = self.moments.iter().rev().find(|moment| !moment.contacts.is_empty());
+        let pushed = pushed.map_or(shaft, |moment| moment.contacts.iter().map(|contact| contact.normal).sum());
+        let signs = [0.0, 1.0, -1.0];
+        let around = signs.iter().flat_map(|x| signs.iter().flat_map(move |y| signs.map(|z| Vector3::new(*x, *y, z))));
+        let directions =
+            [pushed, shaft].into_iter().chain(around).filter_map(|way: Vector3<f64>| way.try_normalize(0.0));
+        let step = LOOK * self.params.radius;
+        let is_free = |way: &Vector3<f64>| {
+            let mut at = (1..=(away / step).ceil() as usize).map(|i| self.centre + way * (i as f64 * step));
+            at.all(|x| self.surface.signed_distance(&x) > self.params.radius - GRAZE)
+        };
+        directions.clone().find(is_free).unwrap_or(shaft)
+    }
+
+    /// Goes along one stroke, starting wherever the ball is. Returns whether it got to the end, or was pressing: a ball that is led freely
+    /// may be caught where the part is in its way.
+    fn follow(&mut self, stroke: &Stroke) -> bool {
+        // points in a row that were not reached
+        let mut missed = 0;
         // a pressed stroke starts sideways of where the ball is, and sinks from there
         let mut guide = stroke.press.and(stroke.points.first()).copied().unwrap_or(self.centre);
         for target in &stroke.points {
             let patience = PATIENCE + PATIENCE_FACTOR * (target - guide).norm() / stroke.speed;
             let until = self.moments.len() + (patience / TICK) as usize;
+            missed += 1;
             while self.moments.len() < until {
                 let lag = self.step(stroke, &guide);
                 let left = target - guide;
@@ -189,10 +251,15 @@ impl Leading<'_> {
                     guide += left.normalize() * advance;
                 } else {
                     guide = *target;
+                    missed = 0;
                     break;
                 }
             }
+            if stroke.press.is_none() && missed == CAUGHT {
+                return false;
+            }
         }
+        stroke.press.is_some() || missed == 0
     }
 
     /// One tick towards the guide; returns how far the ball lags behind it, m.

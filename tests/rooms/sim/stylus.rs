@@ -331,3 +331,31 @@ fn from_several_sides_the_ball_never_goes_through_the_part() {
         assert!(path.iter().any(|stroke| stroke.press.is_some_and(|press| (*press + *side).norm() < 1e-9)));
     }
 }
+
+/// In a slot that has a floor the hand wants to go on through its wall, then to a place below the plate.
+#[test]
+fn a_ball_that_is_caught_is_taken_out_and_around_the_part() {
+    let plate = Plate::default();
+    let features = plate.features();
+    let slot = features.iter().find(|feature| matches!(feature.shape, TruthShape::Slot { .. })).unwrap().centre;
+    let still = |points: Vec<Point3<f64>>| Stroke { points, speed: 0.04, press: None };
+    let at = |x: f64, y: f64, z: f64| slot + Vector3::new(x, y, z) * 1e-3;
+    let through_the_wall = (0..200).map(|i| at(0.0, 0.1 * f64::from(i), -1.0)).collect();
+    let below = [Point3::new(slot.x, slot.y, -9e-3), Point3::new(slot.x, slot.y, -6e-3)];
+    let path = [
+        still(vec![at(0.0, 0.0, 15.0), at(0.0, 0.0, -1.0)]),
+        still(through_the_wall),
+        // not from where it is caught
+        still(vec![at(0.0, 0.0, -1.0), at(0.0, 0.0, 15.0)]),
+        still(below.to_vec()),
+    ];
+    let params = StylusParams { stray: 0.0, ..StylusParams::default() };
+    let touched = touch(&plate, &path, &params, 1).unwrap();
+    let centre = |m: &Moment| Point3::from(m.pose_ot.translation.vector);
+    let deepest = touched.moments.iter().map(|m| plate.signed_distance(&centre(m))).fold(f64::MAX, f64::min);
+    assert!(deepest > params.radius - 1e-9, "{deepest}");
+    let off = (centre(touched.moments.last().unwrap()) - below[1]).norm();
+    assert!(off < 1.5e-3, "{off} m from where it was to go");
+    let seconds = touched.moments.len() as f64 * 1e-3;
+    assert!(seconds < 20.0, "caught for long: {seconds} s");
+}
