@@ -106,8 +106,9 @@ const CREEP: f64 = 1e-3;
 /// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times what it should take.
 const PATIENCE: f64 = 0.5;
 const PATIENCE_FACTOR: f64 = 2.0;
-/// A ball that is led freely is caught when it reaches so many points in a row not in time.
+/// A ball is caught when it does not reach so many points in a row in time: led freely, and pressed, when it climbs over what is in its way.
 const CAUGHT: usize = 3;
+const CAUGHT_PRESSED: usize = 8;
 /// A way out of where the ball is caught is looked at in steps of this share of its radius …
 const LOOK: f64 = 0.2;
 /// … and may come nearer to the surface than the ball by this, m: it touches where it is caught.
@@ -232,11 +233,11 @@ impl Leading<'_> {
         directions.clone().find(is_free).unwrap_or(shaft)
     }
 
-    /// Goes along one stroke, starting wherever the ball is. Returns whether it got to the end, or was pressing: a ball that is led freely
-    /// may be caught where the part is in its way.
+    /// Goes along one stroke, starting wherever the ball is. Returns whether it got through: it may be caught where the part is in its way.
     fn follow(&mut self, stroke: &Stroke) -> bool {
-        // points in a row that were not reached
+        // points in a row that were not reached, and how many may be
         let mut missed = 0;
+        let (most, most_at_end) = if stroke.press.is_some() { (CAUGHT_PRESSED, CAUGHT_PRESSED) } else { (CAUGHT, 1) };
         // a pressed stroke starts sideways of where the ball is, and sinks from there
         let mut guide = stroke.press.and(stroke.points.first()).copied().unwrap_or(self.centre);
         for target in &stroke.points {
@@ -255,11 +256,11 @@ impl Leading<'_> {
                     break;
                 }
             }
-            if stroke.press.is_none() && missed == CAUGHT {
+            if missed == most {
                 return false;
             }
         }
-        stroke.press.is_some() || missed == 0
+        missed < most_at_end
     }
 
     /// One tick towards the guide; returns how far the ball lags behind it, m.

@@ -2,7 +2,8 @@
 //!
 //! A ball that runs along a round wall keeps its centre at one distance ρ from the axis: ρ = R − r in a bore, R + r around a boss. Seen along
 //! the axis, two contacts with centres p, q and normals m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, where ρ
-//! is positive in a bore and negative around a boss. Directions of axes come of the planes of the part, on which holes stand square, and of
+//! is positive in a bore and negative around a boss. Where a wall is large, what the normals are off by says little of its radius: there the
+//! circle goes through three centres. Directions of axes come of the planes of the part, on which holes stand square, and of
 //! the normals of contacts that no plane explains.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
@@ -32,8 +33,11 @@ const SQUARE: f64 = 0.34;
 const SAME_AXIS: f64 = 0.9986;
 /// So many directions of planes are examined, those of the largest first.
 const MOST_AXES: usize = 12;
-/// Pairs of contacts that are examined in one group.
+/// Pairs of contacts that are examined in one group, and as many threes.
 const PAIRS: usize = 400;
+/// The normals of a pair differ by more than this, squared: 31°; and the sides from one of three to the others meet at more than 15°.
+const TURNED: f64 = 0.3;
+const BENT: f64 = 0.26;
 /// A contact is on a circle within this share of the ball's radius while it is searched …
 const SEARCHED: f64 = 0.1;
 /// … and its normal within 35°.
@@ -103,7 +107,8 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) {
     for (primitive, faces) in found {
         let area = parted.facets.area_of(&faces);
         if area > 0.0 {
-            let segment = Segment { primitive, faces, area, tolerance: TOLERANCE * radius, is_exact: false };
+            let tolerance = TOLERANCE * radius;
+            let segment = Segment { primitive, faces, area, tolerance, is_exact: false, is_felt: true };
             parted.segmentation.add(&parted.facets, segment);
         }
     }
@@ -372,20 +377,16 @@ fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64)> {
         (state >> 33) as usize % below
     };
     for _ in 0..PAIRS.min(all.len() * all.len()) {
-        let (one, other) = (&all[next(all.len())], &all[next(all.len())]);
-        let (apart, turned) = (one.at - other.at, one.normal - other.normal);
-        if turned.norm_squared() < 0.3 {
-            continue;
-        }
-        let rho = -apart.dot(&turned) / turned.norm_squared();
-        let of_wall = rho.abs() + radius * rho.signum();
-        if of_wall < RADII[0] * radius * f64::from(rho > 0.0) || of_wall > RADII[1] * radius || of_wall <= 0.0 {
-            continue;
-        }
-        let centre = nalgebra::center(&(one.at + one.normal * rho), &(other.at + other.normal * rho));
-        let (count, turn) = support(all, &centre, rho, radius);
-        if best.as_ref().is_none_or(|&(most, number, ..)| (turn, count) > (most, number)) {
-            best = Some((turn, count, centre, rho));
+        let [one, other, third] = [(); 3].map(|()| &all[next(all.len())]);
+        for (centre, rho) in [circle_of_two(one, other), circle_of_three([one, other, third])].into_iter().flatten() {
+            let of_wall = rho.abs() + radius * rho.signum();
+            if of_wall < RADII[0] * radius * f64::from(rho > 0.0) || of_wall > RADII[1] * radius || of_wall <= 0.0 {
+                continue;
+            }
+            let (count, turn) = support(all, &centre, rho, radius);
+            if best.as_ref().is_none_or(|&(most, number, ..)| (turn, count) > (most, number)) {
+                best = Some((turn, count, centre, rho));
+            }
         }
     }
     let (_, _, mut centre, mut rho) = best?;
@@ -394,6 +395,29 @@ fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64)> {
     }
     let (count, turn) = support(all, &centre, rho, radius);
     (count >= LEAST && turn as f64 >= TURN * PARTS as f64).then_some((centre, rho))
+}
+
+/// The circle by the centres and normals of two contacts: p + ρ m = q + ρ n, by least squares.
+fn circle_of_two(one: &Projected, other: &Projected) -> Option<(Point2<f64>, f64)> {
+    let (apart, turned) = (one.at - other.at, one.normal - other.normal);
+    if turned.norm_squared() < TURNED {
+        return None;
+    }
+    let rho = -apart.dot(&turned) / turned.norm_squared();
+    Some((nalgebra::center(&(one.at + one.normal * rho), &(other.at + other.normal * rho)), rho))
+}
+
+/// The circle through three centres; its sign is that of the first normal.
+fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>, f64)> {
+    let (a, b) = (other.at - one.at, third.at - one.at);
+    let twice_area = a.perp(&b);
+    if twice_area.abs() < BENT * a.norm() * b.norm() {
+        return None;
+    }
+    let to_centre =
+        Vector2::new(b.y * a.norm_squared() - a.y * b.norm_squared(), a.x * b.norm_squared() - b.x * a.norm_squared())
+            / (2.0 * twice_area);
+    Some((one.at + to_centre, to_centre.norm().copysign(to_centre.dot(&one.normal))))
 }
 
 /// How many contacts are on a circle, and over how many parts of a turn.

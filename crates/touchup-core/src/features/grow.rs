@@ -317,7 +317,8 @@ impl<'a> Growing<'a> {
             return None;
         }
         let area = self.facets.area_of(&faces);
-        Some(Segment { primitive, faces, area, tolerance: self.tolerance, is_exact: self.is_exact() })
+        let (tolerance, is_exact) = (self.tolerance, self.is_exact());
+        Some(Segment { primitive, faces, area, tolerance, is_exact, is_felt: false })
     }
 
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has

@@ -153,11 +153,15 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
     let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
-    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_free(parted, wall) {
+    // a ball that went around a wall was inside of it: what the mesh has there is a plug that nobody felt
+    let is_felt = wall.segments.iter().any(|&number| parted.segment(number).is_felt);
+    if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
         return None;
     }
     let ends = [end(parted, wall, 0), end(parted, wall, 1)];
     let open = match ends.map(|end| end.closed_at.is_none()) {
+        // a plug
+        [false, false] if is_felt => usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0])),
         [false, false] => return None,
         [true, false] => 0,
         [false, true] => 1,

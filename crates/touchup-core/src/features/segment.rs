@@ -21,6 +21,8 @@ pub(crate) struct Segment {
     pub tolerance: f64,
     /// its corners lie on it as in a drawing, not as in a measurement
     pub is_exact: bool,
+    /// contacts alone show it
+    pub is_felt: bool,
 }
 
 /// All segments of a mesh.
