@@ -75,7 +75,7 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
         let faces = faces_on(parted, faces, &better, tolerance);
         let area = parted.facets.area_of(&faces);
-        (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact, is_felt: false })
+        (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact, felt_turn: 0.0 })
     })
 }
 

@@ -78,6 +78,8 @@ struct ContactCylinder {
     /// along the axis from the centre of the surface, m: from the lowest to the highest contact
     ends: [f64; 2],
     count: usize,
+    /// share of a turn that they cover
+    turn: f64,
 }
 
 /// A flat wall and the contacts on it.
@@ -98,17 +100,17 @@ struct ContactWalls {
 pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
-    let of_planes = planes.iter().map(|found| (Primitive::Plane(found.surface), faces_by(parted, found, touches)));
+    let of_planes = planes.iter().map(|found| (Primitive::Plane(found.surface), faces_by(parted, found, touches), 0.0));
     let of_cylinders = cylinders.iter().map(|found| {
         let faces = [faces_on(parted, found, radius), faces_of_same(parted, found, radius)].concat();
-        (Primitive::Cylinder(found.surface), distinct(faces))
+        (Primitive::Cylinder(found.surface), distinct(faces), found.turn)
     });
     let found: Vec<_> = of_planes.chain(of_cylinders).collect();
-    for (primitive, faces) in found {
+    for (primitive, faces, felt_turn) in found {
         let area = parted.facets.area_of(&faces);
         if area > 0.0 {
             let tolerance = TOLERANCE * radius;
-            let segment = Segment { primitive, faces, area, tolerance, is_exact: false, is_felt: true };
+            let segment = Segment { primitive, faces, area, tolerance, is_exact: false, felt_turn };
             parted.segmentation.add(&parted.facets, segment);
         }
     }
@@ -349,10 +351,10 @@ fn circles(
     let mut left: Vec<Projected> = members.iter().filter_map(project).collect();
     let mut found = Vec::new();
     while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
-        let Some((centre, rho)) = best_circle(&left, radius) else { break };
+        let Some((centre, rho, turn)) = best_circle(&left, radius) else { break };
         let on: Vec<usize> = (0..left.len()).filter(|&at| is_on_circle(&left[at], &centre, rho, radius)).collect();
         let numbers: Vec<u32> = on.iter().map(|&at| left[at].touch as u32).collect();
-        if let Some(one) = cylinder_of(touches, &numbers, axis, (centre, rho), [e, g], radius, group_of) {
+        if let Some(one) = cylinder_of(touches, &numbers, axis, (centre, rho, turn), [e, g], radius, group_of) {
             found.push((one, numbers.iter().map(|&number| number as usize).collect()));
         }
         let is_on = |projected: &Projected| is_on_circle(projected, &centre, rho, radius);
@@ -367,8 +369,9 @@ fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) ->
     (distance - rho.abs()).abs() < SEARCHED * radius && v.dot(&one.normal) * rho.signum() > RADIAL * distance
 }
 
-/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m; `None` where none was over enough of it.
-fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64)> {
+/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m, and the share of the turn; `None` where none was
+/// over enough of it.
+fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
     let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut next = |below: usize| {
@@ -394,7 +397,8 @@ fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64)> {
         (centre, rho) = fitted_circle(all, centre, rho, radius)?;
     }
     let (count, turn) = support(all, &centre, rho, radius);
-    (count >= LEAST && turn as f64 >= TURN * PARTS as f64).then_some((centre, rho))
+    let turn = turn as f64 / PARTS as f64;
+    (count >= LEAST && turn >= TURN).then_some((centre, rho, turn))
 }
 
 /// The circle by the centres and normals of two contacts: p + ρ m = q + ρ n, by least squares.
@@ -449,7 +453,7 @@ fn cylinder_of(
     touches: &[ProbedPoint],
     numbers: &[u32],
     axis: &Vector3<f64>,
-    (centre, rho): (Point2<f64>, f64),
+    (centre, rho, turn): (Point2<f64>, f64, f64),
     [e, g]: [Vector3<f64>; 2],
     radius: f64,
     group_of: &[u32],
@@ -469,7 +473,7 @@ fn cylinder_of(
     let surface = if is_near { surface } else { guess };
     let of_axis = along(&surface.axis(), &surface.center());
     let ends = of_axis.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| [low.min(t), high.max(t)]);
-    Some(ContactCylinder { surface, ends, count: numbers.len() })
+    Some(ContactCylinder { surface, ends, count: numbers.len(), turn })
 }
 
 /// How well the direction of an axis is known before its contacts are, rad: 3°.

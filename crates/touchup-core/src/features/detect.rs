@@ -202,7 +202,7 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.place.value));
     let touched = measure.observed.touched_share(&wall.segments);
     // where the mesh has a gap the touches may go all around
-    let is_notch = hole.is_notch && measure.turn(&fitted.touches, wall) < WHOLE_TURN;
+    let is_notch = hole.is_notch && measure.turn(&fitted.touches, wall).max(wall.felt_turn) < WHOLE_TURN;
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),

@@ -318,7 +318,7 @@ impl<'a> Growing<'a> {
         }
         let area = self.facets.area_of(&faces);
         let (tolerance, is_exact) = (self.tolerance, self.is_exact());
-        Some(Segment { primitive, faces, area, tolerance, is_exact, is_felt: false })
+        Some(Segment { primitive, faces, area, tolerance, is_exact, felt_turn: 0.0 })
     }
 
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has

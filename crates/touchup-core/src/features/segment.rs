@@ -21,8 +21,8 @@ pub(crate) struct Segment {
     pub tolerance: f64,
     /// its corners lie on it as in a drawing, not as in a measurement
     pub is_exact: bool,
-    /// contacts alone show it
-    pub is_felt: bool,
+    /// share of a turn over which contacts alone show it, 0 where they do not
+    pub felt_turn: f64,
 }
 
 /// All segments of a mesh.

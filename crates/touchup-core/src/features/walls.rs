@@ -27,8 +27,10 @@ pub(super) struct Wall {
     pub axis: Vector3<f64>,
     /// from where to where it goes along the axis, m
     pub ends: [f64; 2],
-    /// share of the turn that it covers
+    /// share of the turn that it covers, in the mesh or by contacts
     pub coverage: f64,
+    /// that by contacts alone
+    pub felt_turn: f64,
     /// share of what it is between its ends that its faces cover
     pub filled: f64,
     /// unit vector from the axis to the middle of the parts of the turn that it covers; 0 where there is none
@@ -68,7 +70,9 @@ impl Wall {
     fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
         let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
         let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
-        Self::of_faces(facets, &segmentation.segments[segments[0]].primitive, &faces, segments)
+        let felt_turn = segments.iter().map(|&number| segmentation.segments[number].felt_turn).fold(0.0, f64::max);
+        let wall = Self::of_faces(facets, &segmentation.segments[segments[0]].primitive, &faces, segments)?;
+        Some(Self { coverage: wall.coverage.max(felt_turn), felt_turn, ..wall })
     }
 
     /// The wall that these faces are; `None` for a plane.
@@ -104,8 +108,19 @@ impl Wall {
         let towards = (0..PARTS).filter(is_covered).map(away).sum::<Vector3<f64>>();
         let towards = towards.try_normalize(f64::EPSILON * PARTS as f64).unwrap_or_default();
         let filled = 0.0;
-        let mut wall =
-            Self { radius_at_origin, half_angle, is_concave, segments, origin, axis, ends, coverage, filled, towards };
+        let mut wall = Self {
+            radius_at_origin,
+            half_angle,
+            is_concave,
+            segments,
+            origin,
+            axis,
+            ends,
+            coverage,
+            felt_turn: 0.0,
+            filled,
+            towards,
+        };
         let slant = wall.radius() / half_angle.unwrap_or(0.0).cos();
         let whole = TAU * slant * wall.height() * coverage;
         wall.filled = if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 };
