@@ -77,6 +77,69 @@ pub(super) struct Profile {
     hidden: f64,
 }
 
+/// Rows with their weights, which groups share.
+struct Weighted<'a> {
+    rows: &'a [Row],
+    /// 1/m²
+    weights: Vec<f64>,
+    /// group of each row, counted from 0
+    group: Vec<usize>,
+    groups: usize,
+}
+
+impl<'a> Weighted<'a> {
+    /// - `count`: of the terms of each row.
+    /// - returns: `None` where something is not finite, or a standard deviation is not positive.
+    fn of(rows: &'a [Row], count: usize) -> Option<Self> {
+        let names = distinct(rows.iter().map(|row| row.group));
+        let group: Vec<usize> = rows.iter().map(|row| names.partition_point(|&name| name < row.group)).collect();
+        let mut in_group = vec![0.0; names.len()];
+        group.iter().for_each(|&g| in_group[g] += 1.0);
+        let weight = |(row, &g): (&Row, &usize)| 1.0 / (row.sigma * row.sigma * in_group[g]);
+        let weights: Vec<f64> = rows.iter().zip(&group).map(weight).collect();
+        let is_finite = |row: &Row| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
+        let is_sound = rows.iter().all(|row| row.terms.len() == count && is_finite(row))
+            && weights.iter().all(|w| w.is_finite() && *w > 0.0);
+        is_sound.then_some(Self { rows, weights, group, groups: names.len() })
+    }
+
+    /// Variance of the errors over the stated one, by what a solution leaves of the groups.
+    fn excess(&self, choice: &Choice, solution: &DVector<f64>) -> f64 {
+        let (mut of_group, mut weight_of_group) = (vec![0.0; self.groups], vec![0.0; self.groups]);
+        for ((row, &w), &g) in self.rows.iter().zip(&self.weights).zip(&self.group) {
+            let fitted: f64 = choice.terms.iter().zip(solution.iter()).map(|(&term, x)| row.terms[term] * x).sum();
+            of_group[g] += w * (row.value - fitted);
+            weight_of_group[g] += w;
+        }
+        let spare = self.groups.saturating_sub(choice.terms.len()).max(1);
+        let square: f64 = of_group.iter().zip(&weight_of_group).map(|(sum, w)| sum * sum / w).sum();
+        let least = if spare < SPARE_GROUPS { 1.0 } else { f64::MIN_POSITIVE };
+        (square / spare as f64).max(least)
+    }
+}
+
+/// Some terms and the inverse of their information.
+#[derive(Clone)]
+struct Choice {
+    terms: Vec<usize>,
+    inverse: DMatrix<f64>,
+}
+
+/// What a block adds to a choice.
+struct Own {
+    information: DMatrix<f64>,
+    right: DVector<f64>,
+    /// least share of a term that is in no term of the choice
+    share: f64,
+}
+
+impl Own {
+    /// How much the squares of the residuals lose by the block.
+    fn gain(&self) -> f64 {
+        self.information.clone().cholesky().map_or(0.0, |cholesky| self.right.dot(&cholesky.solve(&self.right)))
+    }
+}
+
 /// Weighted normal equations over all terms.
 struct Sums {
     information: DMatrix<f64>,
@@ -85,13 +148,10 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(rows: &[Row], weights: &[f64], count: usize) -> Self {
-        let mut sums = Self {
-            information: DMatrix::zeros(count, count),
-            right: DVector::zeros(count),
-            weight: weights.iter().sum(),
-        };
-        for (row, &w) in rows.iter().zip(weights) {
+    fn of(weighted: &Weighted, count: usize) -> Self {
+        let (information, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut sums = Self { information, right, weight: weighted.weights.iter().sum() };
+        for (row, &w) in weighted.rows.iter().zip(&weighted.weights) {
             let terms = DVector::from_column_slice(&row.terms);
             sums.information.ger(w, &terms, &terms, 1.0);
             sums.right.axpy(w * row.value, &terms, 1.0);
@@ -99,34 +159,98 @@ impl Sums {
         sums
     }
 
-    /// Inverse of the information of some terms.
-    fn inverse(&self, terms: &[usize]) -> Option<DMatrix<f64>> {
-        let chosen = DMatrix::from_fn(terms.len(), terms.len(), |i, j| self.information[(terms[i], terms[j])]);
-        let scale = DVector::from_fn(terms.len(), |i, _| chosen[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip());
-        let scaled = DMatrix::from_fn(terms.len(), terms.len(), |i, j| chosen[(i, j)] * scale[i] * scale[j]);
+    fn choice(&self, terms: Vec<usize>) -> Option<Choice> {
+        let count = terms.len();
+        let entry = |i: usize, j: usize| self.information[(terms[i], terms[j])];
+        let scale = DVector::from_fn(count, |i, _| entry(i, i).max(f64::MIN_POSITIVE).sqrt().recip());
+        let scaled = DMatrix::from_fn(count, count, |i, j| entry(i, j) * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
-        Some(DMatrix::from_fn(terms.len(), terms.len(), |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+        Some(Choice { terms, inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]) })
     }
 
-    fn solution(&self, terms: &[usize], inverse: &DMatrix<f64>) -> DVector<f64> {
+    /// A choice and a block.
+    fn with(&self, choice: &Choice, block: &Range<usize>) -> Option<Choice> {
+        self.choice(choice.terms.iter().copied().chain(block.clone()).collect())
+    }
+
+    fn solution(&self, Choice { terms, inverse }: &Choice) -> DVector<f64> {
         inverse * DVector::from_fn(terms.len(), |i, _| self.right[terms[i]])
     }
 
-    /// What a block adds to some terms: its own information, its own right side, and the least share of a term that is its own.
-    fn own(&self, block: &Range<usize>, terms: &[usize], inverse: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>, f64) {
+    /// By how much the squares of the values are more than those of the residuals.
+    fn explained(&self, choice: &Choice) -> f64 {
+        choice.terms.iter().zip(self.solution(choice).iter()).map(|(&term, x)| self.right[term] * x).sum()
+    }
+
+    fn own(&self, block: &Range<usize>, choice: &Choice) -> Own {
+        let Choice { terms, inverse } = choice;
         let between = DMatrix::from_fn(terms.len(), block.len(), |i, j| self.information[(terms[i], block.start + j)]);
         let inside = self.information.view((block.start, block.start), (block.len(), block.len())).into_owned();
-        let own = &inside - between.tr_mul(&(inverse * &between));
-        let solution = self.solution(terms, inverse);
-        let right = self.right.rows(block.start, block.len()) - between.tr_mul(&solution);
-        let share = (0..block.len()).map(|j| own[(j, j)] / inside[(j, j)].max(f64::MIN_POSITIVE)).fold(1.0, f64::min);
-        (own, right, share)
+        let information = &inside - between.tr_mul(&(inverse * &between));
+        let right = self.right.rows(block.start, block.len()) - between.tr_mul(&self.solution(choice));
+        let share = |j: usize| information[(j, j)] / inside[(j, j)].max(f64::MIN_POSITIVE);
+        let share = (0..block.len()).map(share).fold(1.0, f64::min);
+        Own { information, right, share }
+    }
+
+    /// The terms of the reference that the points determine.
+    fn reference(&self, count: usize) -> Option<Choice> {
+        let mut choice = Choice { terms: Vec::new(), inverse: DMatrix::zeros(0, 0) };
+        for term in 0..count {
+            let is_there = self.information[(term, term)] > 0.0;
+            if is_there && self.own(&(term..term + 1), &choice).share > LEAST_REFERENCE {
+                choice = self.with(&choice, &(term..term + 1))?;
+            }
+        }
+        Some(choice)
+    }
+
+    /// Numbers of the blocks that are no reference and that so many groups carry, and all terms that the points can tell apart.
+    fn sought(&self, blocks: &[Range<usize>], reference: &Choice, groups: usize) -> Option<(Vec<usize>, Choice)> {
+        let first = blocks.first().map_or(0, |block| block.start);
+        let is_carried = |block: &Range<usize>| groups >= first + GROUPS_PER_TERM * (block.end - first);
+        let (mut all, mut sought) = (reference.clone(), Vec::new());
+        for (number, block) in blocks.iter().enumerate().take_while(|(_, block)| is_carried(block)) {
+            if self.own(block, reference).share > LEAST_SHARE {
+                sought.push(number);
+            }
+            let own = self.own(block, &all);
+            if own.share > LEAST_SHARE && own.information.cholesky().is_some() {
+                all = self.with(&all, block)?;
+            }
+        }
+        Some((sought, all))
+    }
+
+    /// Numbers of the blocks that stand out of the noise, and their terms with those of the reference.
+    fn found(
+        &self,
+        blocks: &[Range<usize>],
+        sought: &[usize],
+        reference: &Choice,
+        excess: f64,
+    ) -> Option<(Vec<usize>, Choice)> {
+        let (mut choice, mut found) = (reference.clone(), Vec::new());
+        loop {
+            let rest = sought.iter().filter(|number| !found.contains(*number));
+            let gains = rest.filter_map(|&number| {
+                let own = self.own(&blocks[number], &choice);
+                (own.share > LEAST_SHARE).then(|| (number, own.gain()))
+            });
+            let limit = limit(sought.len(), if found.is_empty() { BY_CHANCE } else { MORE_BY_CHANCE }) * excess;
+            let best = gains.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > limit);
+            let Some((best, _)) = best else { break };
+            found.push(best);
+            choice = self.with(&choice, &blocks[best])?;
+        }
+        found.sort_unstable();
+        Some((found, choice))
     }
 }
 
-/// How much the residuals lose, in squares, by a block.
-fn gain(own: &DMatrix<f64>, right: &DVector<f64>) -> f64 {
-    own.clone().cholesky().map_or(0.0, |cholesky| right.dot(&cholesky.solve(right)))
+/// So much two squares of normal numbers have together by chance in one of so many trials: more than x with probability exp(−x/2).
+fn limit(trials: usize, chance: f64) -> f64 {
+    2.0 * (trials.max(1) as f64 / chance).ln()
 }
 
 impl Profile {
@@ -135,106 +259,31 @@ impl Profile {
     /// - returns: `None` where the points do not determine the reference.
     pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
-        let names = distinct(rows.iter().map(|row| row.group));
-        let group: Vec<usize> = rows.iter().map(|row| names.partition_point(|&name| name < row.group)).collect();
-        let mut in_group = vec![0.0; names.len()];
-        group.iter().for_each(|&g| in_group[g] += 1.0);
-        let weights: Vec<f64> =
-            rows.iter().zip(&group).map(|(row, &g)| 1.0 / (row.sigma * row.sigma * in_group[g])).collect();
-        let is_sound = rows.iter().zip(&weights).all(|(row, w)| {
-            row.value.is_finite()
-                && w.is_finite()
-                && *w > 0.0
-                && row.terms.len() == count
-                && row.terms.iter().all(|x| x.is_finite())
-        });
-        if !is_sound || names.len() < reference + 2 {
-            return None;
-        }
-        let sums = Sums::of(rows, &weights, count);
+        let weighted = Weighted::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
+        let sums = Sums::of(&weighted, count);
+        let reference = sums.reference(reference)?;
+        let (sought, all) = sums.sought(&blocks, &reference, weighted.groups)?;
+        let excess = weighted.excess(&all, &sums.solution(&all));
+        let (found, choice) = sums.found(&blocks, &sought, &reference, excess)?;
 
-        let mut of_reference: Vec<usize> = Vec::new();
-        let mut inverse = DMatrix::zeros(0, 0);
-        for term in 0..reference {
-            let (.., share) = sums.own(&(term..term + 1), &of_reference, &inverse);
-            if sums.information[(term, term)] > 0.0 && share > LEAST_REFERENCE {
-                of_reference.push(term);
-                inverse = sums.inverse(&of_reference)?;
-            }
-        }
-
-        // what is no reference is sought; all that the points can tell apart says how large the errors are
-        let (mut all, mut all_inverse, mut sought) = (of_reference.clone(), inverse.clone(), Vec::new());
-        for (number, block) in blocks.iter().enumerate() {
-            if names.len() < reference + GROUPS_PER_TERM * (block.end - reference) {
-                break;
-            }
-            if sums.own(block, &of_reference, &inverse).2 > LEAST_SHARE {
-                sought.push(number);
-            }
-            let (own, _, share) = sums.own(block, &all, &all_inverse);
-            if share > LEAST_SHARE && own.cholesky().is_some() {
-                all.extend(block.clone());
-                all_inverse = sums.inverse(&all)?;
-            }
-        }
-        let full = sums.solution(&all, &all_inverse);
-        let (mut of_group, mut weight_of_group) = (vec![0.0; names.len()], vec![0.0; names.len()]);
-        for ((row, &w), &g) in rows.iter().zip(&weights).zip(&group) {
-            let fitted: f64 = all.iter().zip(full.iter()).map(|(&term, x)| row.terms[term] * x).sum();
-            of_group[g] += w * (row.value - fitted);
-            weight_of_group[g] += w;
-        }
-        let spare = names.len() - all.len();
-        let square: f64 =
-            of_group.iter().zip(&weight_of_group).map(|(sum, w)| sum * sum / w).sum::<f64>() / spare as f64;
-        let excess = if spare < SPARE_GROUPS { square.max(1.0) } else { square.max(f64::MIN_POSITIVE) };
-
-        // of squares of two normal numbers more than x come by chance with probability exp(−x/2)
-        let limit_by = |chance: f64| 2.0 * (sought.len().max(1) as f64 / chance).ln() * excess;
-        let limit = limit_by(BY_CHANCE);
         let mut least_found = vec![0.0; blocks.len()];
         for &number in &sought {
-            let (own, ..) = sums.own(&blocks[number], &of_reference, &inverse);
-            least_found[number] = (limit / own[(0, 0)]).sqrt();
+            let own = sums.own(&blocks[number], &reference).information[(0, 0)];
+            least_found[number] = (limit(sought.len(), BY_CHANCE) * excess / own).sqrt();
         }
-        let (mut terms, mut found) = (of_reference.clone(), Vec::new());
-        loop {
-            let rest = sought.iter().filter(|number| !found.contains(*number));
-            let gains = rest.filter_map(|&number| {
-                let (own, right, share) = sums.own(&blocks[number], &terms, &inverse);
-                (share > LEAST_SHARE).then(|| (number, gain(&own, &right)))
-            });
-            let limit = if found.is_empty() { limit } else { limit_by(MORE_BY_CHANCE) };
-            let Some((best, _)) = gains.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > limit) else {
-                break;
-            };
-            found.push(best);
-            terms.extend(blocks[best].clone());
-            inverse = sums.inverse(&terms)?;
-        }
-        found.sort_unstable();
-        let solution = sums.solution(&terms, &inverse);
-        let explained = |terms: &[usize], x: &DVector<f64>| -> f64 {
-            terms.iter().zip(x.iter()).map(|(&t, x)| sums.right[t] * x).sum()
-        };
-        let left = (explained(&all, &full) - explained(&terms, &solution)).max(0.0) / excess;
-        let rest = (all.len() - terms.len()) as f64;
+        let left = (sums.explained(&all) - sums.explained(&choice)).max(0.0) / excess;
+        let rest = all.terms.len().saturating_sub(choice.terms.len()) as f64;
+        // noise alone has its mean there and scatters by √(2 rest) about it: a quarter of that goes without saying
         let beyond = (left - rest - (rest / 8.0).sqrt()).max(0.0);
-        let mut coefficients = DVector::zeros(count);
-        terms.iter().zip(solution.iter()).for_each(|(&term, x)| coefficients[term] = *x);
-        let lower = (inverse * excess).cholesky()?.unpack();
-        let mut root = DMatrix::zeros(count, terms.len());
-        terms.iter().enumerate().for_each(|(i, &term)| root.row_mut(term).copy_from(&lower.row(i)));
-        Some(Self {
-            sought,
-            found,
-            blocks,
-            coefficients,
-            root,
-            least_found,
-            hidden: (beyond * excess / sums.weight).sqrt(),
-        })
+        let (mut coefficients, solution) = (DVector::zeros(count), sums.solution(&choice));
+        let lower = (&choice.inverse * excess).cholesky()?.unpack();
+        let mut root = DMatrix::zeros(count, choice.terms.len());
+        for (i, &term) in choice.terms.iter().enumerate() {
+            coefficients[term] = solution[i];
+            root.row_mut(term).copy_from(&lower.row(i));
+        }
+        let hidden = (beyond * excess / sums.weight).sqrt();
+        Some(Self { sought, found, blocks, coefficients, root, least_found, hidden })
     }
 
     /// Sizes of the deviation that some blocks make, each without the bias of noise.

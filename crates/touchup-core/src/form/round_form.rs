@@ -102,51 +102,46 @@ fn terms(all: &[Term], angle: f64, height: f64) -> Vec<f64> {
     terms
 }
 
-/// Form of a round wall; `None` where the points do not determine it.
-///
-/// - `on_axis`, `axis`: of the fitted cylinder, m and a unit vector, in O; `radius`: its, m.
-pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f64>, radius: f64) -> Option<RoundForm> {
-    let [u, v] = tangent_basis(axis);
-    let local = |p: &FormPoint| {
-        let q = p.point - on_axis;
-        (u.dot(&q), v.dot(&q), axis.dot(&q))
+/// The ranges of the terms behind the reference.
+fn blocks(all: &[Term]) -> Vec<Range<usize>> {
+    let mut end = REFERENCE;
+    let mut block = |term: &Term| {
+        end += term.width();
+        end - term.width()..end
     };
-    let heights = points.iter().map(|p| local(p).2);
-    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-    let is_high = high - low > SEVERAL_HEIGHTS * radius;
-    let middle = (low + high) / 2.0;
-    let height_of = |z: f64| if is_high { (z - middle) / ((high - low) / 2.0) } else { 0.0 };
-    let all = Term::all();
-    let blocks: Vec<Range<usize>> = all
-        .iter()
-        .scan(REFERENCE, |at, term| {
-            *at += term.width();
-            Some(*at - term.width()..*at)
-        })
-        .collect();
-    let places: Vec<[f64; 2]> = points
-        .iter()
-        .map(|p| {
-            let (x, y, z) = local(p);
-            [y.atan2(x), height_of(z)]
-        })
-        .collect();
-    let row = |(p, [angle, height]): (&FormPoint, &[f64; 2])| {
-        let (x, y, _) = local(p);
-        Row { terms: terms(&all, *angle, *height), value: x.hypot(y) - radius, sigma: p.sigma, group: p.group }
-    };
-    let rows: Vec<Row> = points.iter().zip(&places).map(row).collect();
-    let profile = Profile::of(&rows, REFERENCE, blocks)?;
-    let lobes = |number: usize| if let Term::Lobes(lobes) = all[number] { Some(lobes) } else { None };
-    let undulations = profile.sought.iter().filter_map(|&number| lobes(number)).max()?;
+    all.iter().map(&mut block).collect()
+}
 
+/// Points around the axis as rows, and the angle and height of each.
+fn rows_of(
+    points: &[FormPoint],
+    all: &[Term],
+    on_axis: &Point3<f64>,
+    axis: &Vector3<f64>,
+    radius: f64,
+) -> (Vec<Row>, Vec<[f64; 2]>, bool) {
+    let [u, v] = tangent_basis(axis);
+    let along = |p: &FormPoint| axis.dot(&(p.point - on_axis));
+    let (low, high) = points.iter().map(along).fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+    let is_high = high - low > SEVERAL_HEIGHTS * radius;
+    let row = |p: &FormPoint| {
+        let (x, y) = (u.dot(&(p.point - on_axis)), v.dot(&(p.point - on_axis)));
+        let height = if is_high { (2.0 * along(p) - low - high) / (high - low) } else { 0.0 };
+        let angle = y.atan2(x);
+        let value = x.hypot(y) - radius;
+        (Row { terms: terms(all, angle, height), value, sigma: p.sigma, group: p.group }, [angle, height])
+    };
+    let (rows, places) = points.iter().map(row).unzip();
+    (rows, places, is_high)
+}
+
+/// Angles all around that are no farther from a touch than touches are from one another, and within a quarter of the shortest undulation.
+fn touched_angles(places: &[[f64; 2]], undulations: u32) -> Option<Vec<f64>> {
     let mut angles: Vec<f64> = places.iter().map(|[angle, _]| angle.rem_euclid(TAU)).collect();
     angles.sort_by(f64::total_cmp);
-    // no farther from a touch than touches are from one another, and within a quarter of the shortest undulation
     let mut gaps: Vec<f64> = angles.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let near = order_statistic(&mut gaps, TYPICAL_GAP)?
-        .max(TAU / (2 * PLACES) as f64)
-        .min(TAU / (4.0 * f64::from(undulations)));
+    let between = order_statistic(&mut gaps, TYPICAL_GAP)?;
+    let near = between.max(TAU / (2 * PLACES) as f64).min(TAU / (4.0 * f64::from(undulations)));
     let is_touched = |angle: &f64| {
         let at = angles.partition_point(|other| other < angle);
         let around = [at.checked_sub(1).unwrap_or(angles.len() - 1), at % angles.len()];
@@ -155,22 +150,40 @@ pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f6
             off.min(TAU - off) <= near
         })
     };
-    let around: Vec<f64> = (0..PLACES).map(|i| TAU * i as f64 / PLACES as f64).filter(is_touched).collect();
-    let section: Vec<Vec<f64>> = around.iter().map(|&angle| terms(&all, angle, 0.0)).collect();
-    let circle: Vec<SVector<f64, 4>> =
-        section.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
-    let is_lobes = |number: usize| lobes(number).is_some();
-    let roundness = profile.sizes(is_lobes, &section, |values| {
-        linear_zone(&circle, values).map(|zone| [zone.minimum_zone, zone.least_squares])
-    })?;
+    Some((0..PLACES).map(|i| TAU * i as f64 / PLACES as f64).filter(is_touched).collect())
+}
+
+/// Form of a round wall; `None` where the points do not determine it.
+///
+/// - `on_axis`, `axis`: of the fitted cylinder, m and a unit vector, in O; `radius`: its, m.
+pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f64>, radius: f64) -> Option<RoundForm> {
+    let all = Term::all();
+    let (rows, places, is_high) = rows_of(points, &all, on_axis, axis, radius);
+    let profile = Profile::of(&rows, REFERENCE, blocks(&all))?;
+    let lobes = |&number: &usize| if let Term::Lobes(lobes) = all[number] { Some(lobes) } else { None };
+    let undulations = profile.sought.iter().filter_map(lobes).max()?;
+    let around = touched_angles(&places, undulations)?;
     Some(RoundForm {
-        roundness: Deviation::of(roundness),
+        roundness: roundness(&profile, &all, &around)?,
         cylindricity: if is_high { cylindricity(&profile, &all, &places) } else { None },
         straightness: if is_high { straightness(&profile, &all, &places) } else { None },
         coverage: around.len() as f64 / PLACES as f64,
         undulations,
-        lobes: profile.found.iter().filter_map(|&number| lobes(number)).collect(),
+        lobes: profile.found.iter().filter_map(lobes).collect(),
     })
+}
+
+/// Of the terms that are alike at all heights, at the angles that were touched.
+fn roundness(profile: &Profile, all: &[Term], around: &[f64]) -> Option<Deviation> {
+    let section: Vec<Vec<f64>> = around.iter().map(|&angle| terms(all, angle, 0.0)).collect();
+    let circle: Vec<SVector<f64, 4>> =
+        section.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
+    let sizes = profile.sizes(
+        |number| matches!(all[number], Term::Lobes(_)),
+        &section,
+        |values| linear_zone(&circle, values).map(|zone| [zone.minimum_zone, zone.least_squares]),
+    );
+    sizes.map(Deviation::of)
 }
 
 /// Part of the turn and of the height in which a place is.
@@ -234,13 +247,13 @@ fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Point2, Rotation3};
+    use nalgebra::{Point2, Point3, Rotation3, Vector3};
     use rand::SeedableRng;
     use rand::distr::Distribution;
     use rand_distr::StandardNormal;
 
-    use super::super::{cylindricity, roundness};
-    use super::*;
+    use super::super::zone::{cylindricity, roundness};
+    use super::{Deviation, Estimate, FormPoint, RoundForm, TAU, round_form};
 
     const RADIUS: f64 = 4e-3;
     const HEIGHT: f64 = 8e-3;
