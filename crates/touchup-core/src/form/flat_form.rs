@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Point3, SVector, Vector3};
+use nalgebra::{Matrix2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
 
 use super::profile::{FormPoint, Profile, Row};
 use super::round_form::Deviation;
@@ -97,15 +97,14 @@ pub fn flat_form(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<
 /// Unit vectors in a plane along the sides of the rectangle that its points fill: along their principal axes.
 fn long_sides(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<f64>) -> Option<[Vector3<f64>; 2]> {
     let [u, v] = tangent_basis(normal);
-    let local =
-        points.iter().map(|p| nalgebra::Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
+    let local = points.iter().map(|p| Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
     let count = points.len().max(1) as f64;
-    let middle = local.clone().sum::<nalgebra::Vector2<f64>>() / count;
-    let scatter: nalgebra::Matrix2<f64> = local.map(|q| (q - middle) * (q - middle).transpose()).sum();
+    let middle = local.clone().sum::<Vector2<f64>>() / count;
+    let scatter: Matrix2<f64> = local.map(|q| (q - middle) * (q - middle).transpose()).sum();
     if !scatter.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let eigen = nalgebra::SymmetricEigen::new(scatter);
+    let eigen = SymmetricEigen::new(scatter);
     Some([0, 1].map(|i| u * eigen.eigenvectors[(0, i)] + v * eigen.eigenvectors[(1, i)]))
 }
 

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Point3};
 use rand::SeedableRng;
 use rand::distr::Distribution;
 use rand_distr::StandardNormal;
@@ -27,7 +27,7 @@ pub struct Estimate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FormPoint {
     /// on the surface, m, in O
-    pub point: nalgebra::Point3<f64>,
+    pub point: Point3<f64>,
     /// standard deviation along the normal, m, > 0
     pub sigma: f64,
     /// points of one group share their error
