@@ -21,7 +21,9 @@
 #[doc = include_str!("../docs/method.md")]
 struct MethodPage;
 
-pub use touchup_core::{align, calibrate, compare, diagnose, features, haptic, mesh, probing, reconstruct, stylus};
+pub use touchup_core::{
+    align, calibrate, compare, diagnose, features, form, haptic, mesh, probing, reconstruct, stylus,
+};
 pub use touchup_session::{clock, live, replay, scene, session};
 pub use {touchup_io as io, touchup_sim as sim};
 

@@ -31,7 +31,9 @@ const PLY_BINARY: &str = "ply\nformat binary_little_endian 1.0\nelement vertex 3
                           element face 1\nproperty list uchar int vertex_indices\nend_header\n";
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_0.mcap\n  \
                         duration: {nanoseconds: 1000000}\n  message_count: 2\n";
-const FEATURES: &str = r#"{"features":[{"id":1,"kind":"hole","center_mm":[1,2,3],"axis":[0,0,1],"diameter_mm":8.0}],"unexplained":0.1,
+const FEATURES: &str = r#"{"features":[{"id":1,"kind":"hole","center_mm":[1,2,3],"axis":[0,0,1],"diameter_mm":8.0,
+"form":{"roundness_mm":0.05,"std":{"roundness_mm":0.003},"coverage":1.0,"lobes":[3]}}],"unexplained":0.1,
+"relations":[{"kind":"perpendicularity","of":1,"to":2,"perpendicularity_mm":0.01,"std":{"perpendicularity_mm":0.002}}],
 "clusters":[{"center_mm":[1,2,3],"vertices":5,"convex":true}]}"#;
 const URDF: &str = r#"<robot name="arm"><link name="base"/><link name="l1"><collision><origin xyz="0 0 .1" rpy="0 0 0"/><geometry>
 <cylinder radius=".05" length=".3"/></geometry></collision></link><link name="flange"/><joint name="a" type="revolute"><parent link="base"/>

@@ -6,7 +6,8 @@ use std::sync::Mutex;
 use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
-    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Touch, plan_demo, raster, scan, touch,
+    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_demo, raster,
+    scan, touch,
 };
 use touchup::stylus::{
     ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser, TipParams, TipShape,
@@ -50,8 +51,12 @@ pub fn plate_scan(seed: u64) -> TriMesh {
 
 /// With the simulator's ground truth.
 pub fn plate_stream(stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
-    let plate = Plate::default();
-    let touch = touch(&plate, &path(stylus), stylus, seed).unwrap();
+    stream_of(&Plate::default(), stylus, seed)
+}
+
+/// The plate as scanned, and a part that is almost the plate as touched.
+pub fn stream_of(part: &dyn Surface, stylus: &StylusParams, seed: u64) -> (PlateStream, Touch) {
+    let touch = touch(part, &path(stylus), stylus, seed).unwrap();
     let mut samples = Vec::new();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     for message in &touch.messages {

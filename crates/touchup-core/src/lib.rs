@@ -11,6 +11,7 @@
 //! | [`mesh`] | the triangle mesh, its repair, its exact closest-face tree, its Laplacian |
 //! | [`reconstruct`] | the touched part of the scan reconstructed |
 //! | [`haptic`] | [`haptic::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
+//! | [`form`] | roundness, flatness, parallelism, position, … of points and of fitted features, with their uncertainty |
 //! | [`features`] | holes, slots, planes, … of a mesh and its touches, with their uncertainty |
 //! | [`align`] | rigid registration: of pairs, of features, of surfaces |
 //! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |
@@ -40,6 +41,7 @@ pub mod calibrate;
 pub mod compare;
 pub mod diagnose;
 pub mod features;
+pub mod form;
 pub mod haptic;
 pub mod mesh;
 pub mod numeric;

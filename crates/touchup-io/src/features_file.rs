@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::file_error::{FileError, read_file, write_file};
 use touchup_core::features::clusters::{Bend, Cluster};
-use touchup_core::features::{Feature, Measured};
+use touchup_core::features::{Feature, Form, Measured, Relation, RelationKind, relations};
+use touchup_core::form::{Deviation, Estimate, RoundForm};
 
 /// Why a file of features could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -32,6 +33,9 @@ pub enum FeaturesFileError {
 pub struct FeatureFile {
     /// in order of `id`
     pub features: Vec<FeatureRecord>,
+    /// how touched features lie to one another
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub relations: Vec<RelationRecord>,
     /// share of the mesh's area that belongs to no plane, cylinder or cone and is not searched
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unexplained: Option<f64>,
@@ -51,6 +55,115 @@ reported! {
         /// whether they bend outward, as the rim of a hole; left out where the number of clusters was given
         pub convex?: bool = cluster.bend.map(|bend| bend == Bend::Convex),
     }
+}
+
+reported! {
+    /// How far a touched surface is off its ideal form: widths of the narrowest zones (ISO 1101) over what was touched of it. 0 where
+    /// nothing stands out of the noise: then `std` is what noise may hide.
+    #[derive(Clone, Deserialize)]
+    pub struct FormRecord, fn of(form: &Form) {
+        /// round walls: of the mean section
+        pub roundness_mm?: f64 = form_number(form, "roundness_mm"),
+        /// round walls that were touched at several heights
+        pub cylindricity_mm?: f64 = form_number(form, "cylindricity_mm"),
+        /// round walls that were touched at three heights all around: diameter of the cylinder that holds the axis
+        pub straightness_mm?: f64 = form_number(form, "straightness_mm"),
+        /// planes
+        pub flatness_mm?: f64 = form_number(form, "flatness_mm"),
+        /// the same by their names about the reference of least squares
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub least_squares: BTreeMap<String, f64> = estimates(form, |deviation| deviation.least_squares.value),
+        /// standard uncertainties by name of the number
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub std: BTreeMap<String, f64> = estimates(form, |deviation| deviation.minimum_zone.std),
+        /// share of the turn, or of the rectangle around the touches, that they cover: the form of the rest is not known
+        #[serde(default)]
+        pub coverage: f64 = match form {
+            Form::Round(round) => round.coverage,
+            Form::Flat(flat) => flat.coverage,
+        },
+        /// round walls: most undulations per turn that were looked for
+        pub undulations?: u32 = round_of(form).map(|round| round.undulations),
+        /// round walls: undulations per turn of what was found
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub lobes: Vec<u32> = round_of(form).map_or_else(Vec::new, |round| round.lobes.clone()),
+    }
+}
+
+fn round_of(form: &Form) -> Option<&RoundForm> {
+    if let Form::Round(round) = form { Some(round) } else { None }
+}
+
+/// The deviations of a form by the names of their numbers.
+fn deviations(form: &Form) -> impl Iterator<Item = (&'static str, Deviation)> {
+    let all = match form {
+        Form::Round(round) => [
+            ("roundness_mm", Some(round.roundness)),
+            ("cylindricity_mm", round.cylindricity),
+            ("straightness_mm", round.straightness),
+        ],
+        Form::Flat(flat) => [("flatness_mm", Some(flat.flatness)), ("", None), ("", None)],
+    };
+    all.into_iter().filter_map(|(name, deviation)| Some((name, deviation?)))
+}
+
+/// Width of the narrowest zone, mm.
+fn form_number(form: &Form, name: &str) -> Option<f64> {
+    deviations(form).find(|(own, _)| *own == name).map(|(_, deviation)| deviation.minimum_zone.value * 1e3)
+}
+
+fn estimates(form: &Form, number: impl Fn(Deviation) -> f64) -> BTreeMap<String, f64> {
+    deviations(form).map(|(name, deviation)| (name.to_owned(), number(deviation) * 1e3)).collect()
+}
+
+reported! {
+    /// How one touched feature lies to another; what does not apply is left out.
+    #[derive(Clone, Deserialize)]
+    pub struct RelationRecord, fn of(relation: &Relation) {
+        /// `perpendicularity`, `parallelism`, `coaxiality` or `distance`
+        pub kind: String = relation.kind.name().to_owned(),
+        /// `id` of the toleranced feature, whose extent counts
+        pub of: u32 = relation.of,
+        /// `id` of the datum
+        pub to: u32 = relation.to,
+        /// width of the zone between parallel planes, of an axis square to a plane diameter of the cylinder
+        pub perpendicularity_mm?: f64 = relation_number(relation, "perpendicularity_mm"),
+        /// width of the zone between parallel planes, of an axis diameter of the cylinder
+        pub parallelism_mm?: f64 = relation_number(relation, "parallelism_mm"),
+        /// diameter of the cylinder about the axis of the datum that holds the axis
+        pub coaxiality_mm?: f64 = relation_number(relation, "coaxiality_mm"),
+        /// diameter of the circle about the axis of the datum that holds the middle of the axis
+        pub concentricity_mm?: f64 = relation_number(relation, "concentricity_mm"),
+        /// of the middle of what was touched from the datum
+        pub distance_mm?: f64 = relation_number(relation, "distance_mm"),
+        /// between normals, axes, or an axis and a plane, 0 to 90
+        pub angle_deg?: f64 = relation_number(relation, "angle_deg"),
+        /// standard uncertainties by name of the number
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub std: BTreeMap<String, f64> = relation_numbers(relation)
+            .map(|(name, estimate, unit)| (name.to_owned(), estimate.std * unit))
+            .collect(),
+    }
+}
+
+/// The numbers of a relation by their names, each with its unit.
+fn relation_numbers(relation: &Relation) -> impl Iterator<Item = (&'static str, Estimate, f64)> {
+    let zone = match relation.kind {
+        RelationKind::Perpendicularity => "perpendicularity_mm",
+        RelationKind::Parallelism => "parallelism_mm",
+        RelationKind::Coaxiality | RelationKind::Distance => "coaxiality_mm",
+    };
+    let all = [
+        (zone, relation.zone, 1e3),
+        ("concentricity_mm", relation.concentricity, 1e3),
+        ("distance_mm", relation.distance, 1e3),
+        ("angle_deg", relation.angle, 1f64.to_degrees()),
+    ];
+    all.into_iter().filter_map(|(name, estimate, unit)| Some((name, estimate?, unit)))
+}
+
+fn relation_number(relation: &Relation, name: &str) -> Option<f64> {
+    relation_numbers(relation).find(|(own, ..)| *own == name).map(|(_, estimate, unit)| estimate.value * unit)
 }
 
 reported! {
@@ -97,6 +210,8 @@ reported! {
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =
             known(feature).filter_map(|(name, std, _)| Some((name.to_owned(), std?))).collect(),
+        /// hole, notch, boss, cylinder, plane: how far what was touched is off its ideal form
+        pub form?: FormRecord = feature.form.as_ref().map(FormRecord::of),
         /// share of its surface within a ball's radius of a touch
         #[serde(default)]
         pub touched: f64 = feature.touched,
@@ -149,8 +264,9 @@ fn runs(numbers: &[u32]) -> Vec<[u32; 2]> {
 impl FeatureFile {
     /// The features as a file has them.
     pub fn of(features: &[Feature], unexplained: f64) -> Self {
+        let relations = relations(features).iter().map(RelationRecord::of).collect();
         let features = features.iter().map(FeatureRecord::of).collect();
-        Self { features, unexplained: Some(unexplained), clusters: Vec::new() }
+        Self { features, relations, unexplained: Some(unexplained), clusters: Vec::new() }
     }
 
     /// Clusters alone.

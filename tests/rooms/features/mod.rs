@@ -3,5 +3,6 @@ mod curvature;
 mod detection;
 mod files;
 mod fit;
+mod form;
 mod touched;
 mod track;

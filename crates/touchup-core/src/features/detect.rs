@@ -5,11 +5,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
 use super::contact_walls::add_contact_walls;
-use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
+use super::feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
 use super::fit::{Ends, Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
-use super::observe::Observed;
+use super::observe::{NOT_ALIKE, Observed};
 use super::primitive::Primitive;
 use super::rims::{RoundOpening, rims};
 use super::scene::Parted;
@@ -122,9 +122,6 @@ struct AxisEnd {
     systematic: f64,
 }
 
-/// Share of what the touches of one plane have in common that those of another have not: poses wander slowly, and the stylus leans otherwise.
-const NOT_ALIKE: f64 = 0.33;
-
 /// Distance of two parallel ends along `direction`, each with its uncertainty.
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     // touched from one side, both are off alike by most of what touches have in common
@@ -210,6 +207,8 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         axis: Some(axis),
         through: hole.through.filter(|_| is_known),
         walls: Some(Walls::Round(fitted.surface)),
+        form: measure.round_form(&fitted).map(Form::Round),
+        element: measure.axis_element(&fitted),
         cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
         ..Feature::new(if is_notch { Kind::Notch } else { Kind::Hole }, centre, touched, fitted.to)
     }
@@ -253,6 +252,8 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(fitted.surface)),
+        form: measure.round_form(&fitted).map(Form::Round),
+        element: measure.axis_element(&fitted),
         ..Feature::new(
             if boss.is_turned { Kind::Cylinder } else { Kind::Boss },
             centre,
@@ -272,6 +273,8 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
         length: Some(Measured { value: wall.height(), ..Measured::default() }),
         axis: Some(fitted.axis(&wall.axis)),
         walls: Some(Walls::Round(fitted.surface)),
+        form: measure.round_form(&fitted).map(Form::Round),
+        element: measure.axis_element(&fitted),
         ..Feature::new(Kind::Cylinder, centre, measure.observed.touched_share(&wall.segments), fitted.to)
     }
 }
@@ -383,5 +386,10 @@ fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
     let (point, normal) = measure.observed.parted.plane(number).map(|plane| (plane.point(), plane.normal()))?;
     let touched = measure.observed.touched_share(&[number]);
     let feature = Feature::new(Kind::Plane, fitted.met(&point, &normal)?, touched, fitted.to);
-    Some(Feature { axis: Some(fitted.axis(&normal)), ..feature })
+    Some(Feature {
+        axis: Some(fitted.axis(&normal)),
+        form: measure.flat_form(&fitted).map(Form::Flat),
+        element: measure.plane_element(&fitted),
+        ..feature
+    })
 }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::fit::{Cylinder, Stadium};
+use crate::form::{Element, FlatForm, RoundForm};
 use crate::names;
 
 names! {
@@ -95,6 +96,19 @@ pub struct Feature {
     pub fitted_to: FittedTo,
     /// the walls that its sizes are of, where it has some
     pub walls: Option<Walls>,
+    /// how far its surface is off its ideal form, where it was fitted to touches
+    pub form: Option<Form>,
+    /// its axis or plane as an element of relations, where it was fitted to touches
+    pub element: Option<Element>,
+}
+
+/// Form of a feature over what was touched of it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// of a hole, notch, boss or cylinder
+    Round(RoundForm),
+    /// of a plane
+    Flat(FlatForm),
 }
 
 /// The walls of a feature.

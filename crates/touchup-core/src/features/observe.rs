@@ -30,6 +30,8 @@ pub(super) struct Observed<'a> {
 
 /// Touches of one stroke within this time share their error: the window in which they are smoothed, and half of it again.
 const SHARED_NS: i64 = 100_000_000;
+/// Share of what the touches of one plane have in common that those of another have not: poses wander slowly, and the stylus leans otherwise.
+pub(super) const NOT_ALIKE: f64 = 0.33;
 /// A touch is of a segment when it is off it by no more than so many tolerances …
 const NEAR_TOLERANCES: f64 = 3.0;
 /// … or this share of the radius of the ball: what the scan and the noise leave.

@@ -1,0 +1,96 @@
+//! Fitted walls as the elements of relations, and their form by the touches on them.
+
+use nalgebra::{Matrix6, Point3, SMatrix, Vector3};
+
+use super::feature::FittedTo;
+use super::fit::{Cylinder, Fit, Plane, Surface};
+use super::measure::{Fitted, Measure};
+use super::observe::NOT_ALIKE;
+use crate::form::{Element, FlatForm, FormPoint, RoundForm, Shape, flat_form, round_form};
+use crate::numeric::{distinct, tangent_basis};
+
+/// Directions in which the outermost touches of a plane are taken.
+const CORNERS: usize = 16;
+
+/// Covariance in O of what a fit says of point and direction, m and rad: without what all touches have in common.
+fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
+    let rotation = fit.surface.pose_of().rotation.to_rotation_matrix();
+    // the freedoms in their order: shifts along x, y, z of F, z leans towards x and y
+    let mut by_freedoms = SMatrix::<f64, 6, 8>::zeros();
+    by_freedoms.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
+    by_freedoms.fixed_view_mut::<3, 2>(3, 3).copy_from(&rotation.matrix().fixed_columns::<2>(0));
+    by_freedoms * fit.own_covariance * by_freedoms.transpose()
+}
+
+impl Measure<'_> {
+    /// The points on a surface that its touches say, as it is: where their balls touch it.
+    fn form_points<S: Surface>(&self, fitted: &Fitted<S>) -> Vec<FormPoint> {
+        let on_surface = |o: super::fit::Observation| {
+            let (_, normal) = fitted.surface.distance_and_normal(&o.point);
+            FormPoint { point: o.point - normal * o.offset, sigma: o.sigma, group: o.group }
+        };
+        self.observed.of_touches(&fitted.touches).into_iter().map(on_surface).collect()
+    }
+
+    /// Roundness, cylindricity and straightness of a wall that was fitted to touches.
+    pub fn round_form(&self, fitted: &Fitted<Cylinder>) -> Option<RoundForm> {
+        let cylinder = &fitted.surface;
+        let is_touched = fitted.to == FittedTo::Touches;
+        let points = self.form_points(fitted);
+        round_form(&points, &cylinder.center(), &cylinder.axis(), cylinder.radius).filter(|_| is_touched)
+    }
+
+    /// Flatness of a plane that was fitted to touches.
+    pub fn flat_form(&self, fitted: &Fitted<Plane>) -> Option<FlatForm> {
+        let points = self.form_points(fitted);
+        flat_form(&points, &fitted.surface.point(), &fitted.surface.normal()).filter(|_| fitted.to == FittedTo::Touches)
+    }
+
+    /// The axis of a wall that was fitted to touches, over the heights of these.
+    pub fn axis_element(&self, fitted: &Fitted<Cylinder>) -> Option<Element> {
+        let direction = fitted.surface.axis();
+        let places = self.touched_places(fitted)?;
+        let heights = || places.iter().map(|p| (p - fitted.surface.center()).dot(&direction));
+        let ends = [heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max)];
+        let extent = ends.map(|height| fitted.surface.center() + direction * height).to_vec();
+        self.element(fitted, Shape::Axis, extent)
+    }
+
+    /// A plane that was fitted to touches, as far as these reach.
+    pub fn plane_element(&self, fitted: &Fitted<Plane>) -> Option<Element> {
+        let normal = fitted.surface.normal();
+        let [u, v] = tangent_basis(&normal);
+        let places = self.touched_places(fitted)?;
+        let outermost = |i: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * i as f64 / CORNERS as f64).sin_cos();
+            let along = |at: usize| (u * cos + v * sin).dot(&places[at].coords);
+            (0..places.len()).max_by(|&a, &b| along(a).total_cmp(&along(b)))
+        };
+        let corners = distinct((0..CORNERS).filter_map(outermost));
+        let on = |at: usize| places[at] - normal * (places[at] - fitted.surface.point()).dot(&normal);
+        self.element(fitted, Shape::Plane, corners.into_iter().map(on).collect())
+    }
+
+    fn touched_places<S: Surface>(&self, fitted: &Fitted<S>) -> Option<Vec<Point3<f64>>> {
+        let is_touched = fitted.to == FittedTo::Touches && !fitted.touches.is_empty();
+        is_touched.then(|| self.form_points(fitted).into_iter().map(|p| p.point).collect())
+    }
+
+    fn element<S: Surface>(&self, fitted: &Fitted<S>, shape: Shape, extent: Vec<Point3<f64>>) -> Option<Element> {
+        let fit = fitted.confirmed()?;
+        let direction = fit.surface.axis();
+        let [calibration, shift] = self.observed.systematic(&fitted.touches);
+        // of what touches have in common, those of another surface have not all
+        let alone = NOT_ALIKE * calibration.hypot(shift);
+        let mut covariance = own_covariance(fit);
+        let free = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| match shape {
+            Shape::Plane => direction * direction.dot(&axis),
+            Shape::Axis => axis - direction * direction.dot(&axis),
+        });
+        for (i, column) in free.iter().enumerate() {
+            let mut block = covariance.fixed_view_mut::<3, 1>(0, i);
+            block += column * (alone * alone);
+        }
+        Some(Element { shape, point: fit.surface.center(), direction, covariance, calibration, extent })
+    }
+}

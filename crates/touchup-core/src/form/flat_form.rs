@@ -1,0 +1,189 @@
+//! Form of a flat wall: flatness.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
+
+use super::profile::{FormPoint, Profile, Row};
+use super::round_form::Deviation;
+use super::zone::linear_zone;
+use crate::numeric::tangent_basis;
+
+/// Form of a flat wall over what was touched of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlatForm {
+    /// distance of two parallel planes
+    pub flatness: Deviation,
+    /// share of the rectangle around the touches that they cover: the form of the rest is not known
+    pub coverage: f64,
+}
+
+/// Polynomials up to this degree in both directions together: three undulations over the wall.
+const MOST_DEGREE: usize = 6;
+/// Places in each direction of the rectangle at which the deviation is taken, from edge to edge.
+const PLACES: usize = 17;
+
+/// Legendre's polynomials at x, −1 to 1.
+fn legendre(x: f64) -> [f64; MOST_DEGREE + 1] {
+    let mut p = [1.0; MOST_DEGREE + 1];
+    p[1] = x;
+    for n in 1..MOST_DEGREE {
+        let k = n as f64;
+        p[n + 1] = ((2.0 * k + 1.0) * x * p[n] - k * p[n - 1]) / (k + 1.0);
+    }
+    p
+}
+
+/// Products of polynomials by their degree: the first three are the plane.
+fn terms([x, y]: [f64; 2]) -> Vec<f64> {
+    let (p, q) = (legendre(x), legendre(y));
+    (0..=MOST_DEGREE).flat_map(|degree| (0..=degree).map(move |i| p[degree - i] * q[i])).collect()
+}
+
+/// Degree of a term.
+fn degree_of(term: usize) -> usize {
+    (0..=MOST_DEGREE).find(|degree| term < (degree + 1) * (degree + 2) / 2).unwrap_or(MOST_DEGREE)
+}
+
+/// Number of terms of the plane.
+const REFERENCE: usize = 3;
+
+/// Flatness of a wall; `None` where the points do not determine it.
+///
+/// - `on_plane`, `normal`: of the fitted plane, m and a unit vector, in O.
+pub fn flat_form(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<f64>) -> Option<FlatForm> {
+    let [u, v] = long_sides(points, on_plane, normal)?;
+    let local: Vec<[f64; 2]> =
+        points.iter().map(|p| [u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))]).collect();
+    let range = |i: usize| {
+        let (low, high) = local.iter().fold((f64::MAX, f64::MIN), |(low, high), q| (low.min(q[i]), high.max(q[i])));
+        [(low + high) / 2.0, ((high - low) / 2.0).max(f64::MIN_POSITIVE)]
+    };
+    let ranges = [range(0), range(1)];
+    let unit = |q: &[f64; 2]| [0, 1].map(|i| ((q[i] - ranges[i][0]) / ranges[i][1]).clamp(-1.0, 1.0));
+    let places: Vec<[f64; 2]> = local.iter().map(unit).collect();
+    let row = |(p, place): (&FormPoint, &[f64; 2])| Row {
+        terms: terms(*place),
+        value: normal.dot(&(p.point - on_plane)),
+        sigma: p.sigma,
+        group: p.group,
+    };
+    let rows: Vec<Row> = points.iter().zip(&places).map(row).collect();
+    let count = terms([0.0; 2]).len();
+    let blocks: Vec<Range<usize>> = (REFERENCE..count).map(|term| term..term + 1).collect();
+    let profile = Profile::of(&rows, REFERENCE, blocks)?;
+
+    // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2 of them over a length of 2
+    let shortest = profile.sought.iter().map(|&number| degree_of(REFERENCE + number)).max()?;
+    let near = 1.0 / shortest as f64;
+    let at = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
+    let mut is_touched = [[false; PLACES]; PLACES];
+    for place in &places {
+        let [rows, columns] = place.map(|x| (0..PLACES).filter(move |&i| (at(i) - x).abs() <= near));
+        rows.for_each(|i| columns.clone().for_each(|j| is_touched[i][j] = true));
+    }
+    let all = (0..PLACES).flat_map(|i| (0..PLACES).map(move |j| (i, j)));
+    let wall: Vec<Vec<f64>> = all.filter(|&(i, j)| is_touched[i][j]).map(|(i, j)| terms([at(i), at(j)])).collect();
+    let plane: Vec<SVector<f64, 4>> =
+        wall.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
+    let flatness = profile.sizes(
+        |_| true,
+        &wall,
+        |values| linear_zone(&plane, values).map(|zone| [zone.minimum_zone, zone.least_squares]),
+    )?;
+    Some(FlatForm { flatness: Deviation::of(flatness), coverage: wall.len() as f64 / (PLACES * PLACES) as f64 })
+}
+
+/// Unit vectors in a plane along the sides of the rectangle that its points fill: along their principal axes.
+fn long_sides(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<f64>) -> Option<[Vector3<f64>; 2]> {
+    let [u, v] = tangent_basis(normal);
+    let local = points.iter().map(|p| Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
+    let count = points.len().max(1) as f64;
+    let middle = local.clone().sum::<Vector2<f64>>() / count;
+    let scatter: Matrix2<f64> = local.map(|q| (q - middle) * (q - middle).transpose()).sum();
+    if !scatter.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let eigen = SymmetricEigen::new(scatter);
+    Some([0, 1].map(|i| u * eigen.eigenvectors[(0, i)] + v * eigen.eigenvectors[(1, i)]))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+    use rand::SeedableRng;
+    use rand::distr::Distribution;
+    use rand_distr::StandardNormal;
+
+    use super::super::{Estimate, flatness};
+    use super::*;
+
+    /// Half sides of the touched part, m.
+    const SIDES: [f64; 2] = [20e-3, 12e-3];
+
+    /// A raster of 15 lines with noise that groups of ten points share.
+    fn touched(seed: u64, height: impl Fn(f64, f64) -> f64) -> FlatForm {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut normal = |sigma: f64| -> f64 { sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng) };
+        let turned = Rotation3::from_euler_angles(0.3, -0.8, 1.7);
+        let mut points = Vec::new();
+        for line in 0..15 {
+            let y = SIDES[1] * (f64::from(line) / 7.0 - 1.0);
+            for group in 0..20 {
+                let shared = normal(10e-6);
+                for i in 0..10 {
+                    let x = SIDES[0] * (f64::from(group * 10 + i) / 99.5 - 1.0);
+                    let z = height(x, y) + shared + normal(5e-6);
+                    points.push(FormPoint {
+                        point: turned * Point3::new(x, y, z),
+                        sigma: 11e-6,
+                        group: line * 20 + group,
+                    });
+                }
+            }
+        }
+        let normal = turned * Vector3::new(1e-4, 2e-4, 1.0).normalize();
+        flat_form(&points, &(turned * Point3::new(0.0, 0.0, 2e-6)), &normal).unwrap()
+    }
+
+    #[test]
+    fn flatness_is_off_by_its_uncertainty() {
+        let saddle = |x: f64, y: f64| 25e-6 * x * y / (SIDES[0] * SIDES[1]);
+        let bow = |x: f64, _: f64| 60e-6 * (x / SIDES[0]).powi(2);
+        let wave = |x: f64, y: f64| 20e-6 * (4.0 * x / SIDES[0]).sin() + 10e-6 * (2.0 * y / SIDES[1]).cos();
+        for (name, height) in [("saddle", &saddle as &dyn Fn(f64, f64) -> f64), ("bow", &bow), ("wave", &wave)] {
+            let at = |i: i32, side: f64| side * f64::from(i) / 30.0;
+            let places = (-30..=30).flat_map(|i| (-30..=30).map(move |j| (i, j)));
+            let points: Vec<_> = places
+                .map(|(i, j)| (at(i, SIDES[0]), at(j, SIDES[1])))
+                .map(|(x, y)| Point3::new(x, y, height(x, y)))
+                .collect();
+            let truth = flatness(&points).unwrap();
+            let (seeds, mut squares) = (150, 0.0);
+            let (mut mean, mut std) = (0.0, 0.0);
+            for seed in 0..seeds {
+                let FlatForm { flatness, coverage } = touched(seed, height);
+                assert!(coverage == 1.0, "{coverage}");
+                let Estimate { value, std: own } = flatness.minimum_zone;
+                squares += ((value - truth.minimum_zone) / own).powi(2) / f64::from(seeds as u32);
+                mean += (value - truth.minimum_zone) * 1e6 / f64::from(seeds as u32);
+                std += own * 1e6 / f64::from(seeds as u32);
+            }
+            let rms = squares.sqrt();
+            println!(
+                "{name}: truth {:.2}, mean error {mean:.2}, std {std:.2} µm; error/std {rms:.2}",
+                truth.minimum_zone * 1e6
+            );
+            assert!((0.8..=1.25).contains(&rms), "{name}: {rms}");
+        }
+    }
+
+    #[test]
+    fn a_flat_wall_is_found_flat_to_its_uncertainty() {
+        let all: Vec<Estimate> = (0..60).map(|seed| touched(seed, |_, _| 0.0).flatness.minimum_zone).collect();
+        let inside = all.iter().filter(|e| e.value <= e.std).count();
+        println!("{inside} of 60 contain 0; std {:.1} µm", all[0].std * 1e6);
+        assert!(inside >= 57, "{inside} of 60");
+        assert_eq!(flat_form(&[], &Point3::origin(), &Vector3::z()), None);
+    }
+}

@@ -1,0 +1,21 @@
+//! Form of what was touched and relations between features, as a drawing tolerances them (ISO 1101), with their uncertainty.
+//!
+//! [`roundness`] and its kin take points as they are; [`round_form()`] and [`flat_form()`] take points with noise, of which they keep the longest
+//! undulations; [`orientation`], [`coaxiality`], [`distance`], [`position`] and their kin take fitted axes and planes.
+
+mod chebyshev;
+mod datum;
+mod element;
+mod flat_form;
+mod profile;
+mod relation;
+mod round_form;
+mod zone;
+
+pub use datum::datum_frame;
+pub use element::{Element, Shape};
+pub use flat_form::{FlatForm, flat_form};
+pub use profile::{Estimate, FormPoint};
+pub use relation::{Orientation, angle, coaxiality, concentricity, distance, orientation, position};
+pub use round_form::{Deviation, RoundForm, round_form};
+pub use zone::{Zone, axis_straightness, cylindricity, flatness, roundness, straightness};

@@ -1,0 +1,358 @@
+//! The longest undulations of noisy points, by weighted least squares.
+//!
+//! Raw points are as far apart as the noise of the outermost ones: the more points, the wider. So the deviation is a sum of few terms, long
+//! undulations as a filter of ISO 12181 or 12781 leaves them, and only terms that stand out of the noise are part of it: they are taken up one
+//! after another, each time the one that explains most. Points of one group share their error and weigh as one; how large the errors are the
+//! residuals of all terms together say.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Point3};
+use rand::SeedableRng;
+use rand::distr::Distribution;
+use rand_distr::StandardNormal;
+
+use crate::numeric::distinct;
+
+/// What is known of a number: the best estimate and its standard uncertainty.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// m or rad
+    pub value: f64,
+    /// m or rad
+    pub std: f64,
+}
+
+/// A measured point of a surface for its form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FormPoint {
+    /// on the surface, m, in O
+    pub point: Point3<f64>,
+    /// standard deviation along the normal, m, > 0
+    pub sigma: f64,
+    /// points of one group share their error
+    pub group: u32,
+}
+
+/// A deviation and what each term would add to it there.
+pub(super) struct Row {
+    pub terms: Vec<f64>,
+    /// m
+    pub value: f64,
+    pub sigma: f64,
+    pub group: u32,
+}
+
+/// Probability that a block of terms is found where there is none …
+const BY_CHANCE: f64 = 0.01;
+/// … and one more beside others: a deviation that is there is seldom of one term.
+const MORE_BY_CHANCE: f64 = 0.05;
+/// A term is looked for when so much of it, squared, is not in the others.
+const LEAST_SHARE: f64 = 0.1;
+/// … and of the reference, for which a short arc suffices.
+const LEAST_REFERENCE: f64 = 1e-7;
+/// Groups for each term, at least.
+const GROUPS_PER_TERM: usize = 3;
+/// From so many spare groups on the residuals say how large the errors are; with fewer these are no less than stated.
+const SPARE_GROUPS: usize = 20;
+/// Draws of the errors, in pairs of opposite sign: their spread is known to 7 %.
+const PAIRS: usize = 50;
+/// Of the draws: the same points give the same numbers.
+const SEED: u64 = 12181;
+
+/// Terms fitted to points.
+pub(super) struct Profile {
+    /// blocks of terms that were looked for, in their order
+    pub sought: Vec<usize>,
+    /// those that stand out of the noise
+    pub found: Vec<usize>,
+    blocks: Vec<Range<usize>>,
+    /// of all terms; 0 where not found
+    coefficients: DVector<f64>,
+    /// of terms found: columns whose products with independent normal numbers are errors of the coefficients
+    root: DMatrix<f64>,
+    /// least length of the first term of each block at which it is found, m; 0 where it was not sought
+    least_found: Vec<f64>,
+    /// root mean square of what the terms that are not found hold together beyond noise, m
+    hidden: f64,
+}
+
+/// Rows with their weights, which groups share.
+struct Weighted<'a> {
+    rows: &'a [Row],
+    /// 1/m²
+    weights: Vec<f64>,
+    /// group of each row, counted from 0
+    group: Vec<usize>,
+    groups: usize,
+}
+
+impl<'a> Weighted<'a> {
+    /// - `count`: of the terms of each row.
+    /// - returns: `None` where something is not finite, or a standard deviation is not positive.
+    fn of(rows: &'a [Row], count: usize) -> Option<Self> {
+        let names = distinct(rows.iter().map(|row| row.group));
+        let group: Vec<usize> = rows.iter().map(|row| names.partition_point(|&name| name < row.group)).collect();
+        let mut in_group = vec![0.0; names.len()];
+        group.iter().for_each(|&g| in_group[g] += 1.0);
+        let weight = |(row, &g): (&Row, &usize)| 1.0 / (row.sigma * row.sigma * in_group[g]);
+        let weights: Vec<f64> = rows.iter().zip(&group).map(weight).collect();
+        let is_finite = |row: &Row| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
+        let is_sound = rows.iter().all(|row| row.terms.len() == count && is_finite(row))
+            && weights.iter().all(|w| w.is_finite() && *w > 0.0);
+        is_sound.then_some(Self { rows, weights, group, groups: names.len() })
+    }
+
+    /// Variance of the errors over the stated one, by what a solution leaves of the groups.
+    fn excess(&self, choice: &Choice, solution: &DVector<f64>) -> f64 {
+        let (mut of_group, mut weight_of_group) = (vec![0.0; self.groups], vec![0.0; self.groups]);
+        for ((row, &w), &g) in self.rows.iter().zip(&self.weights).zip(&self.group) {
+            let fitted: f64 = choice.terms.iter().zip(solution.iter()).map(|(&term, x)| row.terms[term] * x).sum();
+            of_group[g] += w * (row.value - fitted);
+            weight_of_group[g] += w;
+        }
+        let spare = self.groups.saturating_sub(choice.terms.len()).max(1);
+        let square: f64 = of_group.iter().zip(&weight_of_group).map(|(sum, w)| sum * sum / w).sum();
+        let least = if spare < SPARE_GROUPS { 1.0 } else { f64::MIN_POSITIVE };
+        (square / spare as f64).max(least)
+    }
+}
+
+/// Some terms and the inverse of their information.
+#[derive(Clone)]
+struct Choice {
+    terms: Vec<usize>,
+    inverse: DMatrix<f64>,
+}
+
+/// What a block adds to a choice.
+struct Own {
+    information: DMatrix<f64>,
+    right: DVector<f64>,
+    /// least share of a term that is in no term of the choice
+    share: f64,
+}
+
+impl Own {
+    /// How much the squares of the residuals lose by the block.
+    fn gain(&self) -> f64 {
+        self.information.clone().cholesky().map_or(0.0, |cholesky| self.right.dot(&cholesky.solve(&self.right)))
+    }
+}
+
+/// Weighted normal equations over all terms.
+struct Sums {
+    information: DMatrix<f64>,
+    right: DVector<f64>,
+    weight: f64,
+}
+
+impl Sums {
+    fn of(weighted: &Weighted, count: usize) -> Self {
+        let (information, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut sums = Self { information, right, weight: weighted.weights.iter().sum() };
+        for (row, &w) in weighted.rows.iter().zip(&weighted.weights) {
+            let terms = DVector::from_column_slice(&row.terms);
+            sums.information.ger(w, &terms, &terms, 1.0);
+            sums.right.axpy(w * row.value, &terms, 1.0);
+        }
+        sums
+    }
+
+    fn choice(&self, terms: Vec<usize>) -> Option<Choice> {
+        let count = terms.len();
+        let entry = |i: usize, j: usize| self.information[(terms[i], terms[j])];
+        let scale = DVector::from_fn(count, |i, _| entry(i, i).max(f64::MIN_POSITIVE).sqrt().recip());
+        let scaled = DMatrix::from_fn(count, count, |i, j| entry(i, j) * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        Some(Choice { terms, inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]) })
+    }
+
+    /// A choice and a block.
+    fn with(&self, choice: &Choice, block: &Range<usize>) -> Option<Choice> {
+        self.choice(choice.terms.iter().copied().chain(block.clone()).collect())
+    }
+
+    fn solution(&self, Choice { terms, inverse }: &Choice) -> DVector<f64> {
+        inverse * DVector::from_fn(terms.len(), |i, _| self.right[terms[i]])
+    }
+
+    /// By how much the squares of the values are more than those of the residuals.
+    fn explained(&self, choice: &Choice) -> f64 {
+        choice.terms.iter().zip(self.solution(choice).iter()).map(|(&term, x)| self.right[term] * x).sum()
+    }
+
+    fn own(&self, block: &Range<usize>, choice: &Choice) -> Own {
+        let Choice { terms, inverse } = choice;
+        let between = DMatrix::from_fn(terms.len(), block.len(), |i, j| self.information[(terms[i], block.start + j)]);
+        let inside = self.information.view((block.start, block.start), (block.len(), block.len())).into_owned();
+        let information = &inside - between.tr_mul(&(inverse * &between));
+        let right = self.right.rows(block.start, block.len()) - between.tr_mul(&self.solution(choice));
+        let share = |j: usize| information[(j, j)] / inside[(j, j)].max(f64::MIN_POSITIVE);
+        let share = (0..block.len()).map(share).fold(1.0, f64::min);
+        Own { information, right, share }
+    }
+
+    /// The terms of the reference that the points determine.
+    fn reference(&self, count: usize) -> Option<Choice> {
+        let mut choice = Choice { terms: Vec::new(), inverse: DMatrix::zeros(0, 0) };
+        for term in 0..count {
+            let is_there = self.information[(term, term)] > 0.0;
+            if is_there && self.own(&(term..term + 1), &choice).share > LEAST_REFERENCE {
+                choice = self.with(&choice, &(term..term + 1))?;
+            }
+        }
+        Some(choice)
+    }
+
+    /// Numbers of the blocks that are no reference and that so many groups carry, and all terms that the points can tell apart.
+    fn sought(&self, blocks: &[Range<usize>], reference: &Choice, groups: usize) -> Option<(Vec<usize>, Choice)> {
+        let first = blocks.first().map_or(0, |block| block.start);
+        let is_carried = |block: &Range<usize>| groups >= first + GROUPS_PER_TERM * (block.end - first);
+        let (mut all, mut sought) = (reference.clone(), Vec::new());
+        for (number, block) in blocks.iter().enumerate().take_while(|(_, block)| is_carried(block)) {
+            if self.own(block, reference).share > LEAST_SHARE {
+                sought.push(number);
+            }
+            let own = self.own(block, &all);
+            if own.share > LEAST_SHARE && own.information.cholesky().is_some() {
+                all = self.with(&all, block)?;
+            }
+        }
+        Some((sought, all))
+    }
+
+    /// Numbers of the blocks that stand out of the noise, and their terms with those of the reference.
+    fn found(
+        &self,
+        blocks: &[Range<usize>],
+        sought: &[usize],
+        reference: &Choice,
+        excess: f64,
+    ) -> Option<(Vec<usize>, Choice)> {
+        let (mut choice, mut found) = (reference.clone(), Vec::new());
+        loop {
+            let rest = sought.iter().filter(|number| !found.contains(*number));
+            let gains = rest.filter_map(|&number| {
+                let own = self.own(&blocks[number], &choice);
+                (own.share > LEAST_SHARE).then(|| (number, own.gain()))
+            });
+            let limit = limit(sought.len(), if found.is_empty() { BY_CHANCE } else { MORE_BY_CHANCE }) * excess;
+            let best = gains.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > limit);
+            let Some((best, _)) = best else { break };
+            found.push(best);
+            choice = self.with(&choice, &blocks[best])?;
+        }
+        found.sort_unstable();
+        Some((found, choice))
+    }
+}
+
+/// So much two squares of normal numbers have together by chance in one of so many trials: more than x with probability exp(−x/2).
+fn limit(trials: usize, chance: f64) -> f64 {
+    2.0 * (trials.max(1) as f64 / chance).ln()
+}
+
+impl Profile {
+    /// - `reference`: how many of the first terms are the reference, which is no deviation.
+    /// - `blocks`: terms that are found together or not at all, behind the reference, the longest undulations first.
+    /// - returns: `None` where the points do not determine the reference.
+    pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
+        let count = blocks.last().map_or(reference, |last| last.end);
+        let weighted = Weighted::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
+        let sums = Sums::of(&weighted, count);
+        let reference = sums.reference(reference)?;
+        let (sought, all) = sums.sought(&blocks, &reference, weighted.groups)?;
+        let excess = weighted.excess(&all, &sums.solution(&all));
+        let (found, choice) = sums.found(&blocks, &sought, &reference, excess)?;
+
+        let mut least_found = vec![0.0; blocks.len()];
+        for &number in &sought {
+            let own = sums.own(&blocks[number], &reference).information[(0, 0)];
+            least_found[number] = (limit(sought.len(), BY_CHANCE) * excess / own).sqrt();
+        }
+        let left = (sums.explained(&all) - sums.explained(&choice)).max(0.0) / excess;
+        let rest = all.terms.len().saturating_sub(choice.terms.len()) as f64;
+        // noise alone has its mean there and scatters by √(2 rest) about it: a quarter of that goes without saying
+        let beyond = (left - rest - (rest / 8.0).sqrt()).max(0.0);
+        let (mut coefficients, solution) = (DVector::zeros(count), sums.solution(&choice));
+        let lower = (&choice.inverse * excess).cholesky()?.unpack();
+        let mut root = DMatrix::zeros(count, choice.terms.len());
+        for (i, &term) in choice.terms.iter().enumerate() {
+            coefficients[term] = solution[i];
+            root.row_mut(term).copy_from(&lower.row(i));
+        }
+        let hidden = (beyond * excess / sums.weight).sqrt();
+        Some(Self { sought, found, blocks, coefficients, root, least_found, hidden })
+    }
+
+    /// Sizes of the deviation that some blocks make, each without the bias of noise.
+    ///
+    /// Noise makes any size larger. What it adds is found by adding errors, as large as those of the coefficients, once more \[Efron and
+    /// Tibshirani 1993, ch. 10\], and taken off; their spread is the uncertainty. Where no block was found the size is 0, and its
+    /// uncertainty the root mean square of a size that is equally likely anything up to the least that would have been found.
+    ///
+    /// - `places`: terms at the places at which the deviation is taken, all that was touched and nothing else.
+    /// - `sizes`: of deviations at these, m.
+    /// - returns: `None` where no block was sought.
+    pub fn sizes<const S: usize>(
+        &self,
+        blocks: impl Fn(usize) -> bool,
+        places: &[Vec<f64>],
+        sizes: impl Fn(&[f64]) -> Option<[f64; S]>,
+    ) -> Option<[Estimate; S]> {
+        let of = |numbers: &[usize]| -> Vec<usize> {
+            numbers.iter().filter(|number| blocks(**number)).flat_map(|&number| self.blocks[number].clone()).collect()
+        };
+        let field = |terms: &[usize], x: &DVector<f64>| -> Vec<f64> {
+            places.iter().map(|place| terms.iter().map(|&term| place[term] * x[term]).sum()).collect()
+        };
+        let terms = of(&self.found);
+        if terms.is_empty() {
+            return self.least_sizes(&blocks, places, sizes);
+        }
+        let here = sizes(&field(&terms, &self.coefficients))?;
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(SEED);
+        let mut sums = [[0.0; 2]; S];
+        for _ in 0..PAIRS {
+            let normal = DVector::from_fn(self.root.ncols(), |_, _| StandardNormal.sample(&mut rng));
+            let error = &self.root * normal;
+            for moved in [&self.coefficients + &error, &self.coefficients - &error] {
+                let drawn = sizes(&field(&terms, &moved))?;
+                for (sum, off) in sums.iter_mut().zip((0..S).map(|i| drawn[i] - here[i])) {
+                    *sum = [sum[0] + off, sum[1] + off * off];
+                }
+            }
+        }
+        let draws = 2.0 * PAIRS as f64;
+        Some(std::array::from_fn(|i| {
+            let bias = sums[i][0] / draws;
+            let variance = (sums[i][1] / draws - bias * bias).max(0.0) * draws / (draws - 1.0);
+            // a hidden part may raise the highest place and lower the lowest
+            Estimate { value: (here[i] - bias).max(0.0), std: (variance + 2.0 * self.hidden * self.hidden).sqrt() }
+        }))
+    }
+
+    /// Sizes where nothing was found.
+    fn least_sizes<const S: usize>(
+        &self,
+        blocks: &impl Fn(usize) -> bool,
+        places: &[Vec<f64>],
+        sizes: impl Fn(&[f64]) -> Option<[f64; S]>,
+    ) -> Option<[Estimate; S]> {
+        let of_block = |&number: &usize| {
+            let (term, length) = (self.blocks[number].start, self.least_found[number]);
+            sizes(&places.iter().map(|place| place[term] * length).collect::<Vec<f64>>())
+        };
+        let each: Option<Vec<[f64; S]>> = self.sought.iter().filter(|number| blocks(**number)).map(of_block).collect();
+        let each = each.filter(|each| !each.is_empty())?;
+        let mean_square = |i: usize| each.iter().map(|sizes| sizes[i] * sizes[i]).sum::<f64>() / each.len() as f64;
+        // of what is equally likely between 0 and a the mean square is a²/3
+        Some(std::array::from_fn(|i| Estimate { value: 0.0, std: (mean_square(i) / 3.0).sqrt() }))
+    }
+
+    /// Whether something of a block was looked for.
+    pub fn has_sought(&self, blocks: impl Fn(usize) -> bool) -> bool {
+        self.sought.iter().any(|number| blocks(*number))
+    }
+}

@@ -1,0 +1,393 @@
+//! Form of a round wall: roundness, cylindricity, straightness of its axis.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::{Point3, SVector, Vector3};
+
+use super::profile::{Estimate, FormPoint, Profile, Row};
+use super::zone::{axis_straightness, linear_zone};
+use crate::numeric::{order_statistic, tangent_basis};
+
+/// A deviation of form, about both references.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// of the narrowest zone (ISO 1101), m
+    pub minimum_zone: Estimate,
+    /// about the reference of least squares, m
+    pub least_squares: Estimate,
+}
+
+impl Deviation {
+    pub(super) fn of([minimum_zone, least_squares]: [Estimate; 2]) -> Self {
+        Self { minimum_zone, least_squares }
+    }
+}
+
+/// Form of a round wall over what was touched of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RoundForm {
+    /// of the mean section
+    pub roundness: Deviation,
+    /// `None` where it was touched at one height alone
+    pub cylindricity: Option<Deviation>,
+    /// of the axis; `None` where it was not touched at three heights all around
+    pub straightness: Option<Deviation>,
+    /// share of the turn that was touched: the form of the rest is not known
+    pub coverage: f64,
+    /// most undulations per turn that were looked for
+    pub undulations: u32,
+    /// undulations per turn of what was found
+    pub lobes: Vec<u32>,
+}
+
+/// Undulations per turn, at most: the filter of 15 UPR of ISO 12181-2.
+const MOST_UNDULATIONS: u32 = 15;
+/// Places around a turn at which the deviation is taken: of 15 undulations 19 each.
+const PLACES: usize = 288;
+/// This share of the touches is no farther from the next than all may be from a place.
+const TYPICAL_GAP: f64 = 0.9;
+/// Parts of a turn and of the height, each with one place for cylindricity.
+const PARTS: [usize; 2] = [48, 5];
+/// A wall was touched at several heights when they are apart by this share of its radius.
+const SEVERAL_HEIGHTS: f64 = 0.1;
+/// An axis has a section where this share of the turn was touched at its height.
+const SECTION: f64 = 0.5;
+
+/// What a block of terms is of.
+#[derive(Clone, Copy, PartialEq)]
+enum Term {
+    /// so many undulations per turn, alike at all heights
+    Lobes(u32),
+    /// radius by a power of the height
+    Radius(i32),
+    /// axis by a power of the height
+    Axis(i32),
+    /// so many undulations that turn over from one end to the other
+    Twisted(u32),
+}
+
+impl Term {
+    /// All, the longest undulations first.
+    fn all() -> Vec<Self> {
+        let first = [Self::Lobes(2), Self::Lobes(3), Self::Radius(1), Self::Axis(2), Self::Radius(2)];
+        let then = [Self::Lobes(4), Self::Lobes(5), Self::Twisted(2), Self::Twisted(3), Self::Axis(3)];
+        first.into_iter().chain(then).chain((6..=MOST_UNDULATIONS).map(Self::Lobes)).collect()
+    }
+
+    fn width(self) -> usize {
+        if matches!(self, Self::Radius(_)) { 1 } else { 2 }
+    }
+
+    /// Of a place at an angle and a height, −1 to 1 over what was touched.
+    fn push(self, angle: f64, height: f64, terms: &mut Vec<f64>) {
+        let (along, order) = match self {
+            Self::Lobes(lobes) => (1.0, lobes),
+            Self::Radius(power) => return terms.push(height.powi(power)),
+            Self::Axis(power) => (height.powi(power), 1),
+            Self::Twisted(lobes) => (height, lobes),
+        };
+        let (sin, cos) = (f64::from(order) * angle).sin_cos();
+        terms.extend([along * cos, along * sin]);
+    }
+}
+
+/// The terms of the reference: radius, place and direction of the axis.
+const REFERENCE: usize = 5;
+
+fn terms(all: &[Term], angle: f64, height: f64) -> Vec<f64> {
+    let (sin, cos) = angle.sin_cos();
+    let mut terms = vec![1.0, cos, sin, height * cos, height * sin];
+    all.iter().for_each(|term| term.push(angle, height, &mut terms));
+    terms
+}
+
+/// The ranges of the terms behind the reference.
+fn blocks(all: &[Term]) -> Vec<Range<usize>> {
+    let mut end = REFERENCE;
+    let mut block = |term: &Term| {
+        end += term.width();
+        end - term.width()..end
+    };
+    all.iter().map(&mut block).collect()
+}
+
+/// Points around the axis as rows, and the angle and height of each.
+fn rows_of(
+    points: &[FormPoint],
+    all: &[Term],
+    on_axis: &Point3<f64>,
+    axis: &Vector3<f64>,
+    radius: f64,
+) -> (Vec<Row>, Vec<[f64; 2]>, bool) {
+    let [u, v] = tangent_basis(axis);
+    let along = |p: &FormPoint| axis.dot(&(p.point - on_axis));
+    let (low, high) = points.iter().map(along).fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+    let is_high = high - low > SEVERAL_HEIGHTS * radius;
+    let row = |p: &FormPoint| {
+        let (x, y) = (u.dot(&(p.point - on_axis)), v.dot(&(p.point - on_axis)));
+        let height = if is_high { (2.0 * along(p) - low - high) / (high - low) } else { 0.0 };
+        let angle = y.atan2(x);
+        let value = x.hypot(y) - radius;
+        (Row { terms: terms(all, angle, height), value, sigma: p.sigma, group: p.group }, [angle, height])
+    };
+    let (rows, places) = points.iter().map(row).unzip();
+    (rows, places, is_high)
+}
+
+/// Angles all around that are no farther from a touch than touches are from one another, and within a quarter of the shortest undulation.
+fn touched_angles(places: &[[f64; 2]], undulations: u32) -> Option<Vec<f64>> {
+    let mut angles: Vec<f64> = places.iter().map(|[angle, _]| angle.rem_euclid(TAU)).collect();
+    angles.sort_by(f64::total_cmp);
+    let mut gaps: Vec<f64> = angles.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let between = order_statistic(&mut gaps, TYPICAL_GAP)?;
+    let near = between.max(TAU / (2 * PLACES) as f64).min(TAU / (4.0 * f64::from(undulations)));
+    let is_touched = |angle: &f64| {
+        let at = angles.partition_point(|other| other < angle);
+        let around = [at.checked_sub(1).unwrap_or(angles.len() - 1), at % angles.len()];
+        around.iter().any(|&i| {
+            let off = (angles[i] - angle).abs();
+            off.min(TAU - off) <= near
+        })
+    };
+    Some((0..PLACES).map(|i| TAU * i as f64 / PLACES as f64).filter(is_touched).collect())
+}
+
+/// Form of a round wall; `None` where the points do not determine it.
+///
+/// - `on_axis`, `axis`: of the fitted cylinder, m and a unit vector, in O; `radius`: its, m.
+pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f64>, radius: f64) -> Option<RoundForm> {
+    let all = Term::all();
+    let (rows, places, is_high) = rows_of(points, &all, on_axis, axis, radius);
+    let profile = Profile::of(&rows, REFERENCE, blocks(&all))?;
+    let lobes = |&number: &usize| if let Term::Lobes(lobes) = all[number] { Some(lobes) } else { None };
+    let undulations = profile.sought.iter().filter_map(lobes).max()?;
+    let around = touched_angles(&places, undulations)?;
+    Some(RoundForm {
+        roundness: roundness(&profile, &all, &around)?,
+        cylindricity: if is_high { cylindricity(&profile, &all, &places) } else { None },
+        straightness: if is_high { straightness(&profile, &all, &places) } else { None },
+        coverage: around.len() as f64 / PLACES as f64,
+        undulations,
+        lobes: profile.found.iter().filter_map(lobes).collect(),
+    })
+}
+
+/// Of the terms that are alike at all heights, at the angles that were touched.
+fn roundness(profile: &Profile, all: &[Term], around: &[f64]) -> Option<Deviation> {
+    let section: Vec<Vec<f64>> = around.iter().map(|&angle| terms(all, angle, 0.0)).collect();
+    let circle: Vec<SVector<f64, 4>> =
+        section.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
+    let sizes = profile.sizes(
+        |number| matches!(all[number], Term::Lobes(_)),
+        &section,
+        |values| linear_zone(&circle, values).map(|zone| [zone.minimum_zone, zone.least_squares]),
+    );
+    sizes.map(Deviation::of)
+}
+
+/// Part of the turn and of the height in which a place is.
+fn part_of([angle, height]: &[f64; 2]) -> [usize; 2] {
+    let turn = angle.rem_euclid(TAU) / TAU;
+    let part = |share: f64, parts: usize| ((share * parts as f64) as usize).min(parts - 1);
+    [part(turn, PARTS[0]), part((height + 1.0) / 2.0, PARTS[1])]
+}
+
+/// Of all terms, in the middle of the turn of each part of the wall, at its touched height that is farthest from half the height.
+fn cylindricity(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<Deviation> {
+    let mut of_part: Vec<Option<[f64; 2]>> = vec![None; PARTS[0] * PARTS[1]];
+    for place in places {
+        let [turn, height] = part_of(place);
+        let known = &mut of_part[turn * PARTS[1] + height];
+        if known.is_none_or(|known| place[1].abs() > known[1].abs()) {
+            *known = Some([TAU * (turn as f64 + 0.5) / PARTS[0] as f64, place[1]]);
+        }
+    }
+    let wall: Vec<Vec<f64>> = of_part.iter().flatten().map(|[angle, height]| terms(all, *angle, *height)).collect();
+    let cylinder: Vec<SVector<f64, 6>> =
+        wall.iter().map(|place| SVector::from([place[0], place[1], place[2], place[3], place[4], 0.0])).collect();
+    let sizes = profile.sizes(
+        |_| true,
+        &wall,
+        |values| linear_zone(&cylinder, values).map(|zone| [zone.minimum_zone, zone.least_squares]),
+    );
+    sizes.map(Deviation::of)
+}
+
+/// Of the terms that shift sections, at the heights that were touched around enough of the turn.
+fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<Deviation> {
+    let is_axis = |number: usize| matches!(all[number], Term::Axis(_));
+    if !profile.has_sought(is_axis) {
+        return None;
+    }
+    let heights: Vec<f64> = (0..PARTS[1])
+        .filter_map(|part| {
+            let here: Vec<&[f64; 2]> = places.iter().filter(|place| part_of(place)[1] == part).collect();
+            let mut turn = [false; PARTS[0]];
+            here.iter().for_each(|place| turn[part_of(place)[0]] = true);
+            let is_section = turn.iter().filter(|is| **is).count() as f64 > SECTION * PARTS[0] as f64;
+            let outermost = here.iter().map(|place| place[1]).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            outermost.filter(|_| is_section)
+        })
+        .collect();
+    if heights.len() < 3 {
+        return None;
+    }
+    // towards angle 0 a shifted section is farther out by its x, a quarter of a turn on by its y
+    let both = heights.iter().flat_map(|&height| [(0.0, height), (TAU / 4.0, height)]);
+    let middles: Vec<Vec<f64>> = both.map(|(angle, height)| terms(all, angle, height)).collect();
+    let sizes = profile.sizes(is_axis, &middles, |values| {
+        // the height in units of its own: only its proportions matter
+        let middle = |(xy, height): (&[f64], &f64)| Point3::new(xy[0], xy[1], *height);
+        let middles: Vec<Point3<f64>> = values.chunks(2).zip(&heights).map(middle).collect();
+        axis_straightness(&middles).map(|zone| [zone.minimum_zone, zone.least_squares])
+    });
+    sizes.map(Deviation::of)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point2, Point3, Rotation3, Vector3};
+    use rand::SeedableRng;
+    use rand::distr::Distribution;
+    use rand_distr::StandardNormal;
+
+    use super::super::zone::{cylindricity, roundness};
+    use super::{Deviation, Estimate, FormPoint, RoundForm, TAU, round_form};
+
+    const RADIUS: f64 = 4e-3;
+    const HEIGHT: f64 = 8e-3;
+    /// Error that points of one group share, and that of each alone, m.
+    const SHARED: f64 = 8e-6;
+    const OWN: f64 = 6e-6;
+
+    /// Turns around a wall at `rings` heights, 30 groups of ten points each, with noise; the fitted cylinder is off and leans.
+    fn touched(seed: u64, rings: u32, turn: f64, radius: impl Fn(f64, f64) -> f64) -> Option<RoundForm> {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut normal = |sigma: f64| -> f64 { sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng) };
+        let turned = Rotation3::from_euler_angles(0.3, -0.8, 1.7);
+        let mut points = Vec::new();
+        for ring in 0..rings {
+            let z = HEIGHT * (f64::from(ring) / f64::from(rings - 1) - 0.5);
+            for group in 0..30 {
+                let shared = normal(SHARED);
+                for i in 0..10 {
+                    let angle = turn * f64::from(group * 10 + i) / 300.0;
+                    let rho = radius(angle, z) + shared + normal(OWN);
+                    let point = turned * Point3::new(rho * angle.cos(), rho * angle.sin(), z);
+                    points.push(FormPoint { point, sigma: SHARED.hypot(OWN), group: ring * 30 + group });
+                }
+            }
+        }
+        let axis = turned * Vector3::new(3e-4, -2e-4, 1.0).normalize();
+        round_form(&points, &(turned * Point3::new(2e-6, -3e-6, 0.0)), &axis, RADIUS + 1e-6)
+    }
+
+    /// Root mean square of error over uncertainty of both zones, over seeds.
+    fn errors_over_stds(name: &str, truth: [f64; 2], found: impl Fn(u64) -> Deviation) -> [f64; 2] {
+        let seeds = 150;
+        let (mut squares, mut means, mut stds) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for seed in 0..seeds {
+            let Deviation { minimum_zone, least_squares } = found(seed);
+            for (i, estimate) in [minimum_zone, least_squares].into_iter().enumerate() {
+                squares[i] += ((estimate.value - truth[i]) / estimate.std).powi(2) / seeds as f64;
+                means[i] += (estimate.value - truth[i]) / seeds as f64;
+                stds[i] += estimate.std / seeds as f64;
+            }
+        }
+        let rms = squares.map(f64::sqrt);
+        let um = |x: [f64; 2]| x.map(|x| (x * 1e8).round() / 100.0);
+        println!(
+            "{name}: truth {:?}, mean error {:?}, std {:?} µm; error/std {rms:.2?}",
+            um(truth),
+            um(means),
+            um(stds)
+        );
+        rms
+    }
+
+    fn section(radius: impl Fn(f64) -> f64, turn: f64) -> [f64; 2] {
+        let points: Vec<_> = (0..=2000)
+            .map(|i| turn * f64::from(i) / 2000.0)
+            .map(|t| Point2::new(radius(t) * t.cos(), radius(t) * t.sin()))
+            .collect();
+        let zone = roundness(&points).unwrap();
+        [zone.minimum_zone, zone.least_squares]
+    }
+
+    const HONEST: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+
+    /// 150 seeds determine a root mean square to 6 %. A groove is of many undulations, of which the smallest are lost in noise.
+    #[test]
+    fn roundness_is_off_by_its_uncertainty() {
+        let three = |t: f64| RADIUS + 25e-6 * (3.0 * t + 0.4).cos();
+        let mixed = |t: f64| RADIUS + 20e-6 * (2.0 * t).cos() + 8e-6 * (5.0 * t + 1.0).sin();
+        let dent = |t: f64| RADIUS + 60e-6 * (-((t - 2.0) / 0.5).powi(2)).exp();
+        for (name, radius, turn) in [
+            ("three lobes", &three as &dyn Fn(f64) -> f64, TAU),
+            ("two and five", &mixed, TAU),
+            ("three lobes, 220°", &three, 220f64.to_radians()),
+            ("a groove", &dent, TAU),
+        ] {
+            let found = |seed| touched(seed, 3, turn, |t, _| radius(t)).unwrap().roundness;
+            let rms = errors_over_stds(name, section(radius, turn), found);
+            let most = if name == "a groove" { 1.5 } else { *HONEST.end() };
+            assert!(rms.iter().all(|rms| (*HONEST.start()..=most).contains(rms)), "{name}: {rms:?}");
+        }
+    }
+
+    #[test]
+    fn a_round_wall_is_found_round_to_its_uncertainty() {
+        let forms: Vec<RoundForm> = (0..60).map(|seed| touched(seed, 3, TAU, |_, _| RADIUS).unwrap()).collect();
+        let all = forms.iter().flat_map(|form| {
+            [Some(form.roundness), form.cylindricity, form.straightness]
+                .into_iter()
+                .flatten()
+                .flat_map(|d| [d.minimum_zone, d.least_squares])
+        });
+        let all: Vec<Estimate> = all.collect();
+        let inside = all.iter().filter(|e| e.value <= e.std).count() as f64 / all.len() as f64;
+        let largest = all.iter().map(|e| e.std).fold(0.0, f64::max);
+        println!("{:.1} % of the perfect forms contain 0; std up to {:.1} µm", inside * 100.0, largest * 1e6);
+        assert!(inside > 0.95 && largest < 10e-6, "{inside} {largest}");
+    }
+
+    #[test]
+    fn a_cone_and_a_bent_axis_are_off_by_their_uncertainty() {
+        let wall = |radius: &dyn Fn(f64, f64) -> f64| {
+            let points: Vec<Point3<f64>> = (0..=20)
+                .flat_map(|ring| {
+                    (0..180).map(move |i| (TAU * f64::from(i) / 180.0, HEIGHT * (f64::from(ring) / 20.0 - 0.5)))
+                })
+                .map(|(t, z)| Point3::new(radius(t, z) * t.cos(), radius(t, z) * t.sin(), z))
+                .collect();
+            let zone = cylindricity(&points, &Point3::origin(), &Vector3::z()).unwrap();
+            [zone.minimum_zone, zone.least_squares]
+        };
+        let cone = |_: f64, z: f64| RADIUS + 60e-6 * z / HEIGHT;
+        let found = |seed| touched(seed, 5, TAU, cone).unwrap().cylindricity.unwrap();
+        let rms = errors_over_stds("cone", wall(&cone), found);
+        assert!(rms.iter().all(|rms| HONEST.contains(rms)), "{rms:?}");
+        // middles on a parabola from 0 to 40 µm: a cylinder of that diameter holds them; that of least squares about five heights, 0, ±½, ±1,
+        // has its axis at half of 40 µm, from which the ends are off by the same
+        let bent = |t: f64, z: f64| RADIUS + 40e-6 * (2.0 * z / HEIGHT).powi(2) * t.cos();
+        let found = |seed| touched(seed, 5, TAU, bent).unwrap().straightness.unwrap();
+        let rms = errors_over_stds("bent axis", [40e-6, 40e-6], found);
+        assert!(rms.iter().all(|rms| HONEST.contains(rms)), "{rms:?}");
+        let round: Vec<Estimate> =
+            (0..30).map(|seed| touched(seed, 5, TAU, bent).unwrap().roundness.minimum_zone).collect();
+        assert!(round.iter().filter(|e| e.value <= e.std).count() > 26, "its sections are round");
+    }
+
+    #[test]
+    fn what_was_not_touched_has_no_form() {
+        let three = |t: f64, _: f64| RADIUS + 25e-6 * (3.0 * t).cos();
+        let form = touched(1, 5, TAU / 2.0, three).unwrap();
+        assert!((form.coverage - 0.5).abs() < 0.06, "{}", form.coverage);
+        let whole = touched(1, 5, TAU, three).unwrap();
+        assert!(whole.coverage == 1.0 && whole.lobes == [3] && whole.undulations == 15, "{whole:?}");
+        assert_eq!(round_form(&[], &Point3::origin(), &Vector3::z(), 1.0), None);
+        let bad = FormPoint { point: Point3::new(f64::NAN, 0.0, 0.0), sigma: 1e-6, group: 0 };
+        assert_eq!(round_form(&[bad; 40], &Point3::origin(), &Vector3::z(), 1.0), None);
+    }
+}
