@@ -12,12 +12,12 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from touch_groups import groups_of
+
 # the plate of the demo: diameters of its holes and its boss, width of its slot, mm
 DRAWN = {"hole": [8.0, 6.0], "boss": [10.0], "slot": [6.0]}
 # what a fit without the program's correction for curvature may differ by, mm
 AGREE_MM = 0.001
-# touches of one stroke within so long share their error: together they weigh as one
-SHARED_NS = 100_000_000
 # a number is fitted to at least so many
 LEAST_TOUCHES = 12
 
@@ -62,23 +62,10 @@ def across(axis):
     return np.linalg.svd(np.atleast_2d(axis))[2][1:].T
 
 
-def groups_of(demo):
-    """The group with a shared error of each touch of the file, by its line."""
-    groups, begun = [], (None, 0)
-    for touch in demo.touches:
-        stroke, stamp = touch["stroke"], int(touch["stamp_ns"])
-        if not groups or stroke != begun[0] or stamp - begun[1] >= SHARED_NS:
-            begun = (stroke, stamp)
-            groups.append(groups[-1] + 1 if groups else 0)
-        else:
-            groups.append(groups[-1])
-    return np.array(groups)
-
-
 def weights_of(demo, touches):
     """Square roots of the weights: of its group each touch has an equal share."""
     sigma, weight = columns(touches, "sigma_mm", "weight").T
-    group = groups_of(demo)[[int(touch["touch"]) for touch in touches]]
+    group = np.array(groups_of(demo.touches))[[int(touch["touch"]) for touch in touches]]
     together = np.bincount(group)[group]
     return np.sqrt(weight / together) / sigma
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from touch_groups import groups_of
+
 # axes of both holes of the demo's plate and its height, mm
 THROUGH, BLIND, TOP = np.array([16.0, 36.0]), np.array([32.0, 34.0]), 12.0
 # amplitude of the lobes, mm, and by how much the blind hole leans
 LOBE, LEAN = 0.025, np.radians(0.1)
-# touches of one stroke within so long share their error: together they weigh as one
-SHARED_NS = 100_000_000
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +59,7 @@ def wall_of(feature, touches):
     chosen = [touches[at] for at in named]
     centres = np.array([[float(t[f"center_{a}_mm"]) for a in "xyz"] for t in chosen]) - feature["center_mm"]
     x, y, z = centres @ u, centres @ v, centres @ axis
-    groups, begun = [], (None, 0)
-    for touch in chosen:
-        stroke, stamp = touch["stroke"], int(touch["stamp_ns"])
-        if not groups or stroke != begun[0] or stamp - begun[1] >= SHARED_NS:
-            begun = (stroke, stamp)
-            groups.append(groups[-1] + 1 if groups else 0)
-        else:
-            groups.append(groups[-1])
+    groups = np.array(groups_of(touches))[named]
     together = np.bincount(groups)[groups]
     sigma, weight = (np.array([float(t[name]) for t in chosen]) for name in ("sigma_mm", "weight"))
     # of a hole the ball's centre is nearer to the axis by its radius

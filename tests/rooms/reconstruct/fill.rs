@@ -14,7 +14,7 @@ const RADIUS_MM: f64 = 1.5;
 fn raster(height_mm: f64, side: f64) -> Vec<Sample> {
     let at = |i: usize| {
         let (line, along) = ((i / 400) as f64, (i % 400) as f64 / 40.0);
-        let x = if i / 400 % 2 == 0 { 15.0 + along } else { 25.0 - along };
+        let x = if (i / 400).is_multiple_of(2) { 15.0 + along } else { 25.0 - along };
         sample(i, [x, 15.0 + line, height_mm + side * RADIUS_MM], 2.0 * side)
     };
     (0..4400).map(at).collect()
