@@ -154,7 +154,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let radius = wall.radius();
     let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
     // a ball that went around a wall was inside of it: what the mesh has there is a plug that nobody felt
-    let is_felt = wall.felt_turn >= HOLE_COVERAGE;
+    let is_felt = wall.felt_turn > 0.0;
     if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
         return None;
     }

@@ -29,7 +29,7 @@ pub(super) struct Wall {
     pub ends: [f64; 2],
     /// share of the turn that it covers, in the mesh or by contacts
     pub coverage: f64,
-    /// that by contacts alone
+    /// that by contacts alone, 0 where they are not all around
     pub felt_turn: f64,
     /// share of what it is between its ends that its faces cover
     pub filled: f64,
@@ -39,6 +39,8 @@ pub(super) struct Wall {
 
 /// Into so many parts a turn is divided.
 const PARTS: usize = 72;
+/// Contacts over this share of a turn are all around: those on the end of a slot, or in a notch, are not.
+const ALL_AROUND: f64 = 0.75;
 /// Axes of one wall differ by less: 6°.
 const SAME_AXIS: f64 = 0.9945;
 /// Radii of one wall differ by less than this share, and so do places of the axis.
@@ -70,7 +72,8 @@ impl Wall {
     fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
         let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
         let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
-        let felt_turn = segments.iter().map(|&number| segmentation.segments[number].felt_turn).fold(0.0, f64::max);
+        let felt_turns = segments.iter().map(|&number| segmentation.segments[number].felt_turn);
+        let felt_turn = felt_turns.filter(|&turn| turn >= ALL_AROUND).fold(0.0, f64::max);
         let wall = Self::of_faces(facets, &segmentation.segments[segments[0]].primitive, &faces, segments)?;
         Some(Self { coverage: wall.coverage.max(felt_turn), felt_turn, ..wall })
     }
