@@ -82,14 +82,19 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
 }
 
-/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge.
+/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge, which looks wider in a measured mesh …
 const ROUNDED_EDGE: f64 = 0.3;
+const ROUNDED_EDGE_MEASURED: f64 = 0.45;
+/// … and when it is there between its ends: what lies on it of four walls of a block is not.
+const SHAFT_FILLED: f64 = 0.8;
 
 /// Whether a wall has the material inside and is large enough to be reported.
 fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     let area: f64 = wall.segments.iter().map(|&number| parted.segment(number).area).sum();
     let is_large = area > LEAST_PLANE * parted.diagonal * parted.diagonal;
-    is_large && !wall.is_concave && !wall.is_cone() && wall.coverage > ROUNDED_EDGE
+    let least = if parted.rounding.is_some() { ROUNDED_EDGE } else { ROUNDED_EDGE_MEASURED };
+    let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
+    is_large && !wall.is_concave && !wall.is_cone() && is_whole
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
