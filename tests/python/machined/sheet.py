@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-SIZE = 220
+SIZE = 180
 MARGIN = 8
 TOWARDS_EYE = np.array([0.45, -0.75, 1.0])
 LIGHT = np.array([0.3, 0.5, 0.8])
