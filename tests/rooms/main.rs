@@ -23,6 +23,7 @@ mod cli;
 mod compare;
 mod diagnose;
 mod features;
+mod form;
 mod haptic;
 mod io;
 mod layers;
