@@ -96,7 +96,7 @@ def drilled(part, rng, face, kind, group):
         is_last = number == len(steps) - 1
         one = hole_feature(face.at(*spot, -before), axis, size, down - before, is_through if is_last else False, group=group)
         if not is_last:
-            # a step's floor is a ring: what it is called is told by the group
+            # a step's floor is a ring: the group says what it is
             one.sizes["through"] = None
         part.cut(rod(size / 2, end if is_last else -down, OUT), place, one)
         part.note(one)

@@ -45,8 +45,8 @@ class Result:
         for true, found in self.verdict.wrong_kind:
             yield f"{self.name}: kind {described(true)} | {described(found)}"
         for true, found in self.verdict.pairs:
-            is_told = true.sizes.get("through") is not None and found.get("through") is not None
-            if true.kind == found["kind"] == "hole" and is_told and true.sizes["through"] != found["through"]:
+            is_known = true.sizes.get("through") is not None and found.get("through") is not None
+            if true.kind == found["kind"] == "hole" and is_known and true.sizes["through"] != found["through"]:
                 yield f"{self.name}: through {described(true)} | {described(found)}"
 
 
@@ -102,8 +102,8 @@ def simulated(touchup, folder, seed, family, world, scanner):
 def refined(touchup, folder, world):
     files = ["--scan", folder / "scan.ply", "--bag", folder / "touch.mcap", "--out", folder / "refined.ply"]
     files += ["--features-out", folder / "features.json", "--touches-out", folder / "touches.csv"]
-    told = ["--scene", folder / "scene.yaml"] if world else ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"]
-    done = run([touchup, "refine", *files, *told, "--json"])
+    options = ["--scene", folder / "scene.yaml"] if world else ["--mesh-unit", "mm", "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"]
+    done = run([touchup, "refine", *files, *options, "--json"])
     (folder / "refine.log").write_text(done.stdout + done.stderr)
     # 4: the recordings lose messages on purpose
     if done.returncode not in (0, 4):
@@ -154,8 +154,8 @@ def part_run(touchup, out, seed, world, scanner):
     if not (folder / "truth_contacts.csv").exists():
         simulated(touchup, folder, seed, family, world, scanner)
     features = into_part(refined(touchup, folder, world), folder, world)
-    told = np.loadtxt(folder / "truth_contacts.csv", delimiter=",", skiprows=1, ndmin=2)
-    centres, contacts = told[:, 1:4], told[:, 4:7]
+    contacts_file = np.loadtxt(folder / "truth_contacts.csv", delimiter=",", skiprows=1, ndmin=2)
+    centres, contacts = contacts_file[:, 1:4], contacts_file[:, 4:7]
     radius = np.median(np.linalg.norm(centres - contacts, axis=1))
     shares = touched_shares(part, mesh, labels, contacts)
     fits = [feature.entry_mm > 2 * radius + ROOM_MM for feature in part.features]
