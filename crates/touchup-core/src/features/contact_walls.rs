@@ -7,6 +7,8 @@
 //! the normals of contacts that no plane explains.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use super::facets::NONE;
 use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
@@ -35,6 +37,8 @@ const SAME_AXIS: f64 = 0.9986;
 const MOST_AXES: usize = 12;
 /// Pairs of contacts that are examined in one group, and as many threes.
 const PAIRS: usize = 400;
+/// Of the draws.
+const SEED: u64 = 1;
 /// The normals of a pair differ by more than this, squared: 31°; and the sides from one of three to the others meet at more than 15°.
 const TURNED: f64 = 0.3;
 const BENT: f64 = 0.26;
@@ -373,14 +377,10 @@ fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) ->
 /// over enough of it.
 fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
     let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut next = |below: usize| {
-        // a fixed sequence of pairs: the same contacts give the same circles
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as usize % below
-    };
+    // the same contacts give the same circles
+    let mut rng = Pcg64::seed_from_u64(SEED);
     for _ in 0..PAIRS.min(all.len() * all.len()) {
-        let [one, other, third] = [(); 3].map(|()| &all[next(all.len())]);
+        let [one, other, third] = [(); 3].map(|()| &all[rng.random_range(0..all.len())]);
         for (centre, rho) in [circle_of_two(one, other), circle_of_three([one, other, third])].into_iter().flatten() {
             let of_wall = rho.abs() + radius * rho.signum();
             if of_wall < RADII[0] * radius * f64::from(rho > 0.0) || of_wall > RADII[1] * radius || of_wall <= 0.0 {

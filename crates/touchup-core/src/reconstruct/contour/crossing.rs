@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::numeric::direction;
 use crate::reconstruct::evidence::point_evidence::{Evidence, Source};
 use crate::reconstruct::field::grid::ReconstructionGrid;
-use crate::reconstruct::field::lattice::{CellBox, Edge, LatticeNode, stepped};
+use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
@@ -55,38 +55,6 @@ impl Crossings {
     }
 }
 
-/// The edges whose crossing by the values at their ends lies where the ball was at one of `centres` (m, in O): the ball may come to a
-/// crossing between two nodes that it does not come to.
-pub(in crate::reconstruct) fn edges_in_balls(
-    grid: &ReconstructionGrid,
-    evidence: &Evidence<'_>,
-    centres: &[Point3<f64>],
-) -> CellTable<Edge, ()> {
-    let reach = evidence.free_space.cover_radius(evidence.params.radius);
-    let reach_of_ends = reach + grid.lattice.pitch;
-    let cells = (reach_of_ends / grid.lattice.pitch).ceil() as i32;
-    let is_near = |p: Point3<f64>, centre: &Point3<f64>, reach: f64| (p - centre).norm_squared() < reach * reach;
-    let crossed = |edge: &Edge| {
-        let [Some(a), Some(b)] = [edge.node, edge.end()].map(|node| grid.nodes.get(&node)) else { return None };
-        let is_crossed = (a.value < 0.0) != (b.value < 0.0);
-        let is_of_touches = [a, b].iter().all(|state| state.source == Source::Touch);
-        (is_crossed && !is_of_touches).then(|| point_between(grid, edge, [a.value, b.value]))
-    };
-    let mut found = CellTable::default();
-    for centre in centres {
-        let cell = grid.lattice.cell_of(centre);
-        let nodes = (CellBox { lo: cell, hi: cell }).widened(cells, cells);
-        for node in nodes.iter().filter(|&node| is_near(grid.lattice.position(node), centre, reach_of_ends)) {
-            for edge in (0..3).map(|axis| Edge { node, axis }) {
-                if crossed(&edge).is_some_and(|crossing| is_near(crossing, centre, reach)) {
-                    found.insert_with(edge, || ());
-                }
-            }
-        }
-    }
-    found
-}
-
 /// The crossing of an edge by the values at its ends, and where the ball was there, on its surface.
 fn between_beside_free_space(
     grid: &ReconstructionGrid,
@@ -106,13 +74,7 @@ fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing
     let slope = gradient(grid, &ends[0]) * (1.0 - share) + gradient(grid, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();
     let normal = direction(&slope).unwrap_or_else(|| outward.normalize());
-    Crossing { point: point_between(grid, edge, values), normal }
-}
-
-/// Where a straight line between the values at the ends of an edge is 0, m, in O.
-fn point_between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Point3<f64> {
-    let [a, b] = [edge.node, edge.end()].map(|node| grid.lattice.position(node));
-    a + (b - a) * share_of(values)
+    Crossing { point: a + (b - a) * share, normal }
 }
 
 /// Where a straight line between two values is 0, as a share of the segment.

@@ -2,7 +2,7 @@
 
 use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
-use crate::reconstruct::contour::crossing::{Crossings, edges_in_balls};
+use crate::reconstruct::contour::crossing::Crossings;
 use crate::reconstruct::contour::dual_contouring::contour_in;
 use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
@@ -51,9 +51,6 @@ impl Remesh {
     pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Renewed {
         let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
-        for (edge, ()) in edges_in_balls(&self.grid, evidence, &changes.centres).iter() {
-            core.take_around(&edge.node, 1, 1);
-        }
         for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { FURTHER } {
             self.take_up(&changed, &mut core, &mut left);
             let renewed = self.grow(evidence, core, &left);
