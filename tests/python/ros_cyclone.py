@@ -438,6 +438,17 @@ class PointStamped:
     point: Point
 
 
+@message("touchup_msgs/msg/FormDeviation")
+class FormDeviation:
+    characteristic: uint8
+    zone: float64
+    zone_std: float64
+    least_squares: float64
+    coverage: float64
+    undulations: uint32
+    lobes: sequence[uint32]
+
+
 @message("touchup_msgs/msg/Feature")
 class Feature:
     id: uint32
@@ -467,6 +478,22 @@ class Feature:
     convex: uint8
     group: int32
     points: sequence[Point]
+    form: sequence[FormDeviation]
+
+
+@message("touchup_msgs/msg/Relation")
+class Relation:
+    kind: uint8
+    of_feature: uint32
+    to_feature: uint32
+    zone: float64
+    zone_std: float64
+    angle: float64
+    angle_std: float64
+    distance: float64
+    distance_std: float64
+    concentricity: float64
+    concentricity_std: float64
 
 
 @message("touchup_msgs/msg/FeatureArray")
@@ -475,6 +502,7 @@ class FeatureArray:
     session: str
     mesh_version: uint64
     features: sequence[Feature]
+    relations: sequence[Relation]
     unexplained: float64
 
 

@@ -156,6 +156,23 @@ def test_a_feature_mirrors_the_file_of_features():
     assert {name for name in mine if not name.endswith("_std")} - only_live == in_file - {"std", "touches"}
 
 
+@pytest.mark.parametrize(
+    ("message", "selector", "record"),
+    [("FormDeviation", "characteristic", "FormRecord"), ("Relation", "kind", "RelationRecord")],
+)
+def test_form_and_relations_mirror_the_file_of_features(message, selector, record):
+    """Each length and angle that the file names is a value of the selector, or a field of its own."""
+    source = (ROOT / "crates/touchup-io/src/features_file.rs").read_text()
+    body = re.search(rf"pub struct {record}, .*?\{{(.*?)\n    \}}", source, re.DOTALL)[1]
+    in_file = {re.sub(r"_(mm|deg)$", "", name) for name in re.findall(r"^        pub (\w+)\??:", body, re.MULTILINE)}
+    definition = sections(f"msg/{message}.msg")[0]
+    names = {name.removesuffix("_feature") for _, name, _ in fields(definition)} - {selector}
+    constants = {name.lower() for name in re.findall(r"^uint8 (\w+)=\d+$", definition, re.MULTILINE)}
+    # one zone for the kind there, a field named after the kind in the file
+    in_message = (names | constants) - {"zone", "zone_std"}
+    assert {name for name in in_message if not name.endswith("_std")} == in_file - {"std", selector}
+
+
 def test_kinds_are_those_of_the_program():
     source = (ROOT / "crates/touchup-core/src/features/feature.rs").read_text()
     kinds = re.findall(r"^ *\w+ = \"(\w+)\",$", re.search(r"pub enum Kind \{(.*?)\n *\}", source, re.DOTALL)[1], re.MULTILINE)

@@ -39,8 +39,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("ur", "clock stylus plan arm"),
     (
         "ros",
-        "parameters clock log_lines stylus mesh reconstruct haptic live features plan arm execute sim align calibrate \
-         compare diagnose io scene session",
+        "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
+         calibrate compare diagnose io scene session",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (

@@ -3,10 +3,12 @@
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::convert::{NO_VECTOR, point, point_of, pose, vector, vector_of};
-use crate::features::{Feature, FittedTo, Kind, Measured};
+use crate::features::{Feature, FittedTo, Form, Kind, Measured, Relation, RelationKind};
+use crate::form::{Deviation, Estimate};
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
-    ColorRGBA, Feature as FeatureMsg, FeatureArray, Marker, MarkerArray, Point, Pose, Vector3 as Vector3Msg,
+    ColorRGBA, Feature as FeatureMsg, FeatureArray, FormDeviation, Marker, MarkerArray, Point, Pose,
+    Relation as RelationMsg, Vector3 as Vector3Msg,
 };
 use crate::ros::parameters::KIND_NAMES;
 use crate::ros::refusal::unknown_feature;
@@ -90,6 +92,64 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
         convex: yes_no(feature.is_convex),
         group: feature.group.and_then(|group| i32::try_from(group).ok()).unwrap_or(FeatureMsg::NO_GROUP),
         points: feature.points.iter().map(point).collect(),
+        form: feature.form.as_ref().map_or_else(Vec::new, form_deviations),
+    }
+}
+
+/// How far a feature is off its ideal form.
+fn form_deviations(form: &Form) -> Vec<FormDeviation> {
+    let (deviations, coverage, undulations, lobes) = match form {
+        Form::Round(round) => (
+            vec![
+                (FormDeviation::ROUNDNESS, Some(round.roundness)),
+                (FormDeviation::CYLINDRICITY, round.cylindricity),
+                (FormDeviation::STRAIGHTNESS, round.straightness),
+            ],
+            round.coverage,
+            round.undulations,
+            round.lobes.clone(),
+        ),
+        Form::Flat(flat) => (vec![(FormDeviation::FLATNESS, Some(flat.flatness))], flat.coverage, 0, Vec::new()),
+    };
+    let message = |(characteristic, deviation): (u8, Option<Deviation>)| {
+        let deviation = deviation?;
+        Some(FormDeviation {
+            characteristic,
+            zone: deviation.minimum_zone.value,
+            zone_std: deviation.minimum_zone.std,
+            least_squares: deviation.least_squares.value,
+            coverage,
+            undulations,
+            lobes: lobes.clone(),
+        })
+    };
+    deviations.into_iter().filter_map(message).collect()
+}
+
+/// How a feature lies to another.
+///
+/// - `name_of`: the number by which a feature is known that the detector numbers so.
+pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg {
+    let [zone, angle, distance, concentricity] =
+        [relation.zone, relation.angle, relation.distance, relation.concentricity]
+            .map(|estimate| estimate.unwrap_or(Estimate { value: f64::NAN, std: f64::NAN }));
+    RelationMsg {
+        kind: match relation.kind {
+            RelationKind::Perpendicularity => RelationMsg::PERPENDICULARITY,
+            RelationKind::Parallelism => RelationMsg::PARALLELISM,
+            RelationKind::Coaxiality => RelationMsg::COAXIALITY,
+            RelationKind::Distance => RelationMsg::DISTANCE,
+        },
+        of_feature: name_of(relation.of),
+        to_feature: name_of(relation.to),
+        zone: zone.value,
+        zone_std: zone.std,
+        angle: angle.value,
+        angle_std: angle.std,
+        distance: distance.value,
+        distance_std: distance.std,
+        concentricity: concentricity.value,
+        concentricity_std: concentricity.std,
     }
 }
 
@@ -241,6 +301,41 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::form::RoundForm;
+
+    #[test]
+    fn form_is_a_list_of_the_deviations_that_are_known() {
+        let deviation = |zone, std, squares| Deviation {
+            minimum_zone: Estimate { value: zone, std },
+            least_squares: Estimate { value: squares, std },
+        };
+        let round = RoundForm {
+            roundness: deviation(50e-6, 4e-6, 52e-6),
+            cylindricity: None,
+            straightness: Some(deviation(0.0, 3e-6, 0.0)),
+            coverage: 0.75,
+            undulations: 15,
+            lobes: vec![2, 3],
+        };
+        let messages = form_deviations(&Form::Round(round));
+        let of = |at: usize| (messages[at].characteristic, messages[at].zone, messages[at].zone_std);
+        assert_eq!(messages.len(), 2);
+        assert_eq!(of(0), (FormDeviation::ROUNDNESS, 50e-6, 4e-6));
+        assert_eq!(of(1), (FormDeviation::STRAIGHTNESS, 0.0, 3e-6));
+        assert!(messages.iter().all(|one| one.coverage == 0.75 && one.lobes == [2, 3]));
+        assert_eq!(messages[0].least_squares, 52e-6);
+    }
+
+    #[test]
+    fn a_relation_goes_by_the_names_of_the_features() {
+        let angle = Some(Estimate { value: 0.01, std: 0.002 });
+        let (zone, distance, concentricity) = (None, None, None);
+        let relation = Relation { kind: RelationKind::Distance, of: 4, to: 7, zone, angle, distance, concentricity };
+        let message = related(&relation, |id| if id == 4 { 40 } else { id });
+        assert_eq!((message.kind, message.of_feature, message.to_feature), (RelationMsg::DISTANCE, 40, 7));
+        assert_eq!((message.angle, message.angle_std), (0.01, 0.002));
+        assert!(message.zone.is_nan() && message.distance_std.is_nan() && message.concentricity.is_nan());
+    }
 
     #[test]
     fn labels_read_as_on_a_drawing() {

@@ -9,10 +9,10 @@ use nalgebra::Vector3;
 
 use super::channels::{ArmMeasurement, FeatureInput, NextTouches, ViewInput};
 use super::convert::header;
-use super::feature_messages::{flagged, found};
+use super::feature_messages::{flagged, found, related};
 use super::shared::Shared;
 use crate::clock::Clock;
-use crate::features::{Feature, Kind, Tracker};
+use crate::features::{Feature, Kind, Tracker, relations};
 use crate::mesh::{FaceTree, MeshError};
 use crate::probing::execute::Flag;
 use crate::probing::plan::{NextTouch, advise_next_touch};
@@ -181,7 +181,12 @@ impl FeatureWorker {
 
     /// The number under which a feature is known.
     fn name_of(&self, feature: &Feature) -> u32 {
-        self.names.get(&feature.id).copied().unwrap_or(feature.id)
+        self.name_of_id(feature.id)
+    }
+
+    /// The number under which a feature is known that the detector numbers so.
+    fn name_of_id(&self, id: u32) -> u32 {
+        self.names.get(&id).copied().unwrap_or(id)
     }
 
     /// The nearest feature where somebody pointed, of the kind that is meant. A region to be explored stays one: a plane in it is
@@ -296,11 +301,14 @@ impl FeatureWorker {
         let others: Vec<_> = self.measured.keys().filter(|id| !is_listed(id)).filter_map(|&id| measured(id)).collect();
         features.extend(others);
         features.sort_by_key(|feature| feature.id);
+        let related = |relation| related(relation, |id| self.name_of_id(id));
+        let relations = relations(self.tracker.features()).iter().map(related).collect();
         FeatureArray {
             header: header(stamp_ns, &self.shared.frame),
             session: self.session.clone(),
             mesh_version: version,
             features,
+            relations,
             unexplained: self.tracker.unexplained().unwrap_or(f64::NAN),
         }
     }

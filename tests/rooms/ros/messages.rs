@@ -53,7 +53,7 @@ fn every_message_is_on_the_wire_as_rosbags_has_it() {
         ListParametersRequest ListParametersResponse DescribeParametersRequest DescribeParametersResponse
         SetParametersRequest SetParametersResponse SetParametersAtomicallyRequest SetParametersAtomicallyResponse
         TriggerRequest TriggerResponse SetBoolRequest SetBoolResponse
-        Feature FeatureArray HapticMismatch MeshPatch ProbeResult ProbeSettings ProbeTouch
+        Feature FeatureArray FormDeviation HapticMismatch MeshPatch ProbeResult ProbeSettings ProbeTouch Relation
         DetectFeaturesRequest DetectFeaturesResponse FlagFeatureRequest FlagFeatureResponse ProbeFeatureRequest
         ProbeFeatureResponse ResyncMeshRequest ResyncMeshResponse SaveMeshRequest SaveMeshResponse UndoRequest UndoResponse
         UnflagFeatureRequest UnflagFeatureResponse ProbeGoal ProbeResponse ProbeFeedback
