@@ -10,31 +10,20 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use super::contacts::{
+    ALIKE, LEAST, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned, together,
+};
 use super::facets::NONE;
 use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
 use super::observe::{groups, observation};
 use super::primitive::{Primitive, belongs};
 use super::scene::Parted;
 use super::segment::Segment;
+use super::walls::ALL_AROUND;
 use crate::mesh::{BoxQuery, FaceId};
-use crate::numeric::{DisjointSets, PointGrid, VoxelKey, distinct, mean, median, spreads, tangent_basis, voxel_of};
+use crate::numeric::{distinct, mean, median, tangent_basis};
 use crate::stylus::ProbedPoint;
 
-/// Of contacts closer together than this share of the ball's radius one is enough.
-const THIN: f64 = 0.25;
-/// A contact is on a plane when it is off it by no more than so many standard deviations, or this share of the radius, m …
-const ON_PLANE_SIGMAS: f64 = 4.0;
-const ON_PLANE: f64 = 0.06;
-/// … and its normal is off by less than 25°.
-const ALIKE: f64 = 0.906;
-/// Contacts no farther apart than so many radii of the ball hang together.
-const TOGETHER: f64 = 1.6;
-/// A wall's contacts are square to its axis within 20°: friction and noise.
-const SQUARE: f64 = 0.34;
-/// Directions of axes are the same within 3°.
-const SAME_AXIS: f64 = 0.9986;
-/// So many directions of planes are examined, those of the largest first.
-const MOST_AXES: usize = 12;
 /// Pairs of contacts that are examined in one group, and as many threes.
 const PAIRS: usize = 400;
 /// Of the draws.
@@ -50,8 +39,6 @@ const RADIAL: f64 = 0.82;
 const PARTS: usize = 24;
 /// A cylinder was touched over at least this share of a turn.
 const TURN: f64 = 0.42;
-/// … by at least so many contacts; a flat wall by as many.
-const LEAST: usize = 12;
 /// Contacts from which a flat wall is tried, of one group.
 const STARTS: usize = 40;
 /// A flat wall is at least so many radii of the ball long, and its contacts determine a tilt when they are this wide, in radii.
@@ -84,6 +71,7 @@ struct ContactCylinder {
     count: usize,
     /// share of a turn that they cover
     turn: f64,
+    touches: Vec<usize>,
 }
 
 /// A flat wall and the contacts on it.
@@ -100,8 +88,9 @@ struct ContactWalls {
     planes: Vec<ContactPlane>,
 }
 
-/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie on it.
-pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) {
+/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie on it. Returns for each contact whether
+/// it is on a wall that is round all around.
+pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
     let of_planes = planes.iter().map(|found| (Primitive::Plane(found.surface), faces_by(parted, found, touches), 0.0));
@@ -118,6 +107,11 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) {
             parted.segmentation.add(&parted.facets, segment);
         }
     }
+    let mut is_round = vec![false; touches.len()];
+    for wall in cylinders.iter().filter(|wall| wall.turn >= ALL_AROUND) {
+        wall.touches.iter().for_each(|&at| is_round[at] = true);
+    }
+    is_round
 }
 
 /// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody touched: one wall is one feature.
@@ -180,15 +174,6 @@ fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
     let mut faces: Vec<u32> = query.faces.iter().map(|face| face.0).filter(|&face| is_of(face)).collect();
     faces.sort_unstable();
     faces
-}
-
-/// A contact seen along an axis.
-struct Projected {
-    touch: usize,
-    /// centre of the ball, m
-    at: Point2<f64>,
-    /// unit normal into the air
-    normal: Vector2<f64>,
 }
 
 /// All walls that contacts show, those with the most contacts first.
@@ -277,67 +262,6 @@ fn extent(touches: &[ProbedPoint], members: &[usize]) -> f64 {
     bounds.map_or(0.0, |[low, high]| (high - low).norm())
 }
 
-/// Contacts to look at: one of those that are close together.
-fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
-    let mut seen = std::collections::BTreeSet::<VoxelKey>::new();
-    let mut is_new = |touch: &ProbedPoint| seen.insert(voxel_of(&touch.point, THIN * touch.radius));
-    let is_sound = |touch: &ProbedPoint| !touch.is_rejected && touch.radius > 0.0;
-    (0..touches.len()).filter(|&at| is_sound(&touches[at]) && is_new(&touches[at])).collect()
-}
-
-/// Numbers of the planes that holes may stand on, the largest first.
-fn large_planes(parted: &Parted) -> Vec<usize> {
-    let mut numbers: Vec<usize> =
-        parted.planes().map(|(number, ..)| number).filter(|&number| parted.is_strong(number)).collect();
-    numbers.sort_by(|&a, &b| parted.segment(b).area.total_cmp(&parted.segment(a).area));
-    numbers
-}
-
-fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool {
-    let Some(plane) = parted.plane(number) else { return false };
-    let near = (ON_PLANE_SIGMAS * touch.sigma_along_normal()).max(ON_PLANE * touch.radius);
-    (plane.distance(&touch.centre) - touch.radius).abs() < near && plane.normal().dot(&touch.normal) > ALIKE
-}
-
-/// Directions that axes may have.
-fn axes(parted: &Parted, planes: &[usize], touches: &[ProbedPoint], free: &[usize], radius: f64) -> Vec<Vector3<f64>> {
-    let mut axes: Vec<Vector3<f64>> = Vec::new();
-    let mut add = |axis: Vector3<f64>| {
-        if axes.len() < MOST_AXES && axes.iter().all(|other: &Vector3<f64>| other.dot(&axis).abs() < SAME_AXIS) {
-            axes.push(axis);
-        }
-    };
-    planes.iter().filter_map(|&number| parted.plane(number)).for_each(|plane| add(plane.normal()));
-    // the normals of a round wall are square to its axis
-    for members in together(touches, free, TOGETHER * radius) {
-        let normals = members.iter().map(|&at| touches[at].normal);
-        let [least, second, _] = spreads(normals.clone());
-        if members.len() >= LEAST && least < 0.5 * second {
-            let second_moment: nalgebra::Matrix3<f64> = normals.map(|n| n * n.transpose()).sum();
-            let eigen = second_moment.symmetric_eigen();
-            add(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
-        }
-    }
-    axes
-}
-
-/// Contacts that hang together.
-fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<usize>> {
-    let points: Vec<Point3<f64>> = numbers.iter().map(|&at| touches[at].point).collect();
-    let grid = PointGrid::of(&points, 0..points.len(), reach);
-    let mut sets = DisjointSets::of(points.len());
-    for (at, point) in points.iter().enumerate() {
-        for other in grid.near(point, reach).filter(|&other| other < at) {
-            sets.join(at as u32, other as u32);
-        }
-    }
-    let mut members: std::collections::BTreeMap<u32, Vec<usize>> = std::collections::BTreeMap::new();
-    for (at, &number) in numbers.iter().enumerate() {
-        members.entry(sets.root(at as u32)).or_default().push(number);
-    }
-    members.into_values().filter(|members| members.len() >= LEAST).collect()
-}
-
 /// The circles that contacts lie on, seen along an axis, with the contacts of each.
 fn circles(
     touches: &[ProbedPoint],
@@ -347,12 +271,7 @@ fn circles(
     group_of: &[u32],
 ) -> Vec<(ContactCylinder, Vec<usize>)> {
     let [e, g] = tangent_basis(axis);
-    let project = |&touch: &usize| {
-        let (p, n) = (touches[touch].centre.coords, touches[touch].normal);
-        let normal = Vector2::new(n.dot(&e), n.dot(&g)).try_normalize(0.0)?;
-        Some(Projected { touch, at: Point2::new(p.dot(&e), p.dot(&g)), normal })
-    };
-    let mut left: Vec<Projected> = members.iter().filter_map(project).collect();
+    let mut left = projected(touches, members, [e, g]);
     let mut found = Vec::new();
     while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
         let Some((centre, rho, turn)) = best_circle(&left, radius) else { break };
@@ -473,7 +392,8 @@ fn cylinder_of(
     let surface = if is_near { surface } else { guess };
     let of_axis = along(&surface.axis(), &surface.center());
     let ends = of_axis.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| [low.min(t), high.max(t)]);
-    Some(ContactCylinder { surface, ends, count: numbers.len(), turn })
+    let touches = numbers.iter().map(|&number| number as usize).collect();
+    Some(ContactCylinder { surface, ends, count: numbers.len(), turn, touches })
 }
 
 /// How well the direction of an axis is known before its contacts are, rad: 3°.

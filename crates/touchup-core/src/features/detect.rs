@@ -4,13 +4,13 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
+use super::contact_slots::contact_slots;
 use super::contact_walls::add_contact_walls;
 use super::feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
-use super::fit::{Ends, Fit, Freedom, Plane, Stadium, Surface};
+use super::fit::{Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::{NOT_ALIKE, Observed};
-use super::primitive::Primitive;
 use super::rims::{RoundOpening, rims};
 use super::scene::Parted;
 use super::slots::{Slot, slots};
@@ -40,13 +40,14 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let mut parted = Parted::of(mesh, tree);
     let beside: Vec<_> = borders(&parted, &without_seams(&parted)).into_keys().collect();
     parted.segmentation.join_planes(&parted.facets, beside.into_iter());
-    add_contact_walls(&mut parted, touches);
+    let is_round = add_contact_walls(&mut parted, touches);
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
     let holes = holes(&parted, &walls);
-    let (slots, pockets) = slots(&parted, &walls, &of_face, &borders);
+    let (slots, pockets) =
+        with_felt(contact_slots(&parted, touches, &is_round), slots(&parted, &walls, &of_face, &borders));
     let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| is_sure_plane(&parted, number));
     let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(is_sure).collect();
     let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
@@ -95,6 +96,22 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     let least = if parted.rounding.is_some() { ROUNDED_EDGE } else { ROUNDED_EDGE_MEASURED };
     let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
+}
+
+/// Slots and pockets by contacts, and those of the mesh that are none of them.
+fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
+    let is_new = |slot: &Slot| felt.iter().all(|one| !is_in_slot(one, slot));
+    let (slots, pockets) = (slots.into_iter().filter(is_new).collect(), pockets.into_iter().filter(is_new).collect());
+    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.clone().into_iter().partition(|one| one.is_boxed);
+    ([felt_slots, slots].concat(), [felt_pockets, pockets].concat())
+}
+
+/// Whether the middle of a void is in a slot.
+fn is_in_slot(slot: &Slot, other: &Slot) -> bool {
+    let v = other.centre - other.out * (other.depth / 2.0) - slot.centre;
+    let across = slot.out.cross(&slot.direction);
+    let is_beside = v.dot(&across).abs() < slot.width / 2.0 && v.dot(&slot.direction).abs() < slot.length / 2.0;
+    is_beside && (-slot.depth..slot.depth * ALIKE).contains(&v.dot(&slot.out))
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
@@ -285,10 +302,7 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
 }
 
 fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
-    let is_round =
-        |&number: &usize| matches!(measure.observed.parted.segment(number).primitive, Primitive::Cylinder(_));
-    let ends = if slot.ends.iter().flatten().any(is_round) { Ends::Round } else { Ends::Straight };
-    let fitted = measure.stadium(slot, ends);
+    let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);
     let Stadium { width, length, .. } = fitted.surface;
     let is_fixed = |freedom: Freedom| fitted.fit.as_ref().is_some_and(|fit| fit.std(freedom).is_some());
@@ -302,8 +316,14 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let centre = opening.centre(&fitted, Fit::middle_std);
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };
     let half = direction * (length / 2.0);
-    let touched = measure.observed.touched_share(&slot.walls);
-    let depth = if slot.through && fitted.to == FittedTo::Mesh {
+    let touched = if slot.walls.is_empty() {
+        let side = axis.value.cross(&direction) * (slot.width / 2.0) - axis.value * (slot.depth / 2.0);
+        let side = |sign: f64| [-half, half].map(|end| near + side.component_mul(&Vector3::repeat(sign)) + end);
+        [1.0, -1.0].iter().map(|&sign| measure.observed.touched_along(&side(sign))).sum::<f64>() / 2.0
+    } else {
+        measure.observed.touched_share(&slot.walls)
+    };
+    let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
         Measured { value: slot.depth, ..Measured::default() }
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
@@ -314,7 +334,7 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         length: Some(fitted.number(length, &[(Freedom::Second, 1.0)])),
         depth: Some(depth),
         axis: Some(axis),
-        through: Some(slot.through),
+        through: slot.through,
         walls: Some(Walls::Slot(fitted.surface)),
         points: vec![opening.place.value - half, opening.place.value + half],
         ..Feature::new(kind, centre, touched, fitted.to)

@@ -147,7 +147,8 @@ impl<'a> Measure<'a> {
     }
 
     /// The walls of a slot or pocket.
-    pub fn stadium(&self, slot: &Slot, ends: Ends) -> Fitted<Stadium> {
+    pub fn stadium(&self, slot: &Slot) -> Fitted<Stadium> {
+        let ends = slot.shape;
         let land = self.plane(slot.land).map_or(slot.out, |land| land.surface.normal());
         let centre = slot.centre - slot.out * (slot.depth / 2.0);
         let guess = Stadium::new(centre, &land, &slot.direction, [slot.width, slot.length], ends, true);

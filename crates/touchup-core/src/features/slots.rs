@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::borders::{Borders, is_convex};
 use super::facets::NONE;
-use super::fit::{Plane, Surface};
+use super::fit::{Ends, Plane, Surface};
 use super::primitive::Primitive;
 use super::rays::RayHit;
 use super::scene::Parted;
@@ -16,10 +16,12 @@ use crate::numeric::{mean, without_repeats};
 /// A void between two walls that face each other.
 #[derive(Clone, Debug)]
 pub(super) struct Slot {
-    /// numbers of the walls
-    pub walls: [usize; 2],
+    /// numbers of the walls; none where contacts alone show them
+    pub walls: Vec<usize>,
     /// numbers of the segments that end it, `None` where it is open or ends at nothing that has a name
     pub ends: [Option<usize>; 2],
+    /// of its ends
+    pub shape: Ends,
     /// in the middle of the opening, m, in O
     pub centre: Point3<f64>,
     /// unit vector out of the opening
@@ -32,7 +34,8 @@ pub(super) struct Slot {
     pub length: f64,
     /// m
     pub depth: f64,
-    pub through: bool,
+    /// `None` where its floor was not felt, and no opening on the other side
+    pub through: Option<bool>,
     /// number of the plane that is its floor
     pub floor: Option<usize>,
     /// number of the plane, or of the cylinder with the material inside, around the opening
@@ -40,7 +43,7 @@ pub(super) struct Slot {
     /// whether both ends are closed by planes, so that it is no slot unless it is long
     pub is_boxed: bool,
     /// whether a wall aslant closes an end: it is a recess of another outline
-    is_aslant: bool,
+    pub is_aslant: bool,
     /// area over which the walls face each other, m²
     pub area: f64,
 }
@@ -63,14 +66,14 @@ const LONGEST: f64 = 8.0;
 /// A ring around an end is this much wider.
 const RINGS: f64 = 1.15;
 /// A slot is longer than this many widths; when its ends are flat, longer than that many.
-const LONG: f64 = 1.2;
-const LONG_BOX: f64 = 2.0;
+pub(super) const LONG: f64 = 1.2;
+pub(super) const LONG_BOX: f64 = 2.0;
 /// A slot that is open at an end or has no floor is not wider than this many depths.
-const WIDE: f64 = 3.0;
+pub(super) const WIDE: f64 = 3.0;
 /// A pocket or a closed slot is not wider than this many depths: shallower is a step that an uneven surface has too.
-const SHALLOW: f64 = 12.0;
+pub(super) const SHALLOW: f64 = 12.0;
 /// A pocket is at least as long as wide, but for what the sides of a square one differ by.
-const SQUARISH: f64 = 0.95;
+pub(super) const SQUARISH: f64 = 0.95;
 /// A pocket's walls face each other over this share of them.
 const POCKET_SHARE: f64 = 0.5;
 /// Cosine between a slot and the normal of a wall that closes it aslant: 20° to 75°.
@@ -195,15 +198,16 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
         floor.and_then(|number| parted.exit(number, &middle, &-out)).or(met.map(|met| met.distance)).unwrap_or(deepest);
     let [from, to] = ends.map(|wall| wall.segments[0]);
     Some(Slot {
-        walls: [sides[0].unwrap_or(from), sides[1].unwrap_or(to)],
+        walls: vec![sides[0].unwrap_or(from), sides[1].unwrap_or(to)],
         ends: [Some(to), Some(from)],
+        shape: Ends::Round,
         centre: middle + out * up,
         out,
         direction,
         width,
         length: distance + width,
         depth: up + down,
-        through: met.is_none(),
+        through: Some(met.is_none()),
         floor,
         land,
         is_boxed: false,
@@ -422,16 +426,19 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
             met.or_else(|| round_end_about(parted, &(middle + along * (lengths[at] - width / 2.0)), &out, width));
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
+    let is_round = |&number: &usize| matches!(parted.segment(number).primitive, Primitive::Cylinder(_));
+    let shape = if ends.iter().flatten().any(is_round) { Ends::Round } else { Ends::Straight };
     Some(Slot {
-        walls,
+        walls: walls.to_vec(),
         ends,
+        shape,
         centre,
         out,
         direction,
         width,
         length: lengths[0] + lengths[1],
         depth: up + down,
-        through: met.is_none(),
+        through: Some(met.is_none()),
         floor: flat_floor,
         land,
         is_boxed: flat == 2,

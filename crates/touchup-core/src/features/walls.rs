@@ -40,7 +40,7 @@ pub(super) struct Wall {
 /// Into so many parts a turn is divided.
 const PARTS: usize = 72;
 /// Contacts over this share of a turn are all around: those on the end of a slot, or in a notch, are not.
-const ALL_AROUND: f64 = 0.75;
+pub(super) const ALL_AROUND: f64 = 0.75;
 /// Axes of one wall differ by less: 6°.
 const SAME_AXIS: f64 = 0.9945;
 /// Radii of one wall differ by less than this share, and so do places of the axis.

@@ -1,0 +1,447 @@
+//! Slots and pockets that contacts show: two straight walls that face each other over a void, whatever the mesh has between them.
+//!
+//! Seen along the axis of its opening, a ball of radius r that runs along a straight wall keeps its centre on a line; beside the half-round
+//! end of a slot of width w it keeps it on a circle of radius w/2 − r about the axis of the end, beside a flat end on a line across.
+
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::contacts::{ALIKE, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned, together};
+use super::fit::Ends;
+use super::scene::Parted;
+use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
+use crate::numeric::{median, tangent_basis};
+use crate::stylus::ProbedPoint;
+
+/// A wall was touched by at least so many contacts …
+const LEAST: usize = 8;
+/// … over so many radii of the ball, without a gap of more than so many.
+const LEAST_RADII: f64 = 1.5;
+const GAP_RADII: f64 = 4.0;
+/// Contacts from which a wall is tried in one group, with so many others each, and those that are counted.
+const STARTS: usize = 48;
+const PARTNERS: usize = 12;
+const COUNTED: usize = 1500;
+/// Of the draws.
+const SEED: u64 = 1;
+/// Most walls in one group.
+const MOST_IN_GROUP: usize = 10;
+/// A contact is on a wall within this share of the ball's radius.
+const SEARCHED: f64 = 0.1;
+/// Walls that face each other are parallel within 6°.
+const PARALLEL: f64 = 0.9945;
+/// They face each other over this share of the longer one.
+const FACING: f64 = 0.4;
+/// So many contacts on something between the walls make it two voids.
+const ISLAND: usize = 6;
+const ISLAND_LEAN: f64 = 0.7;
+/// An end was felt when so many contacts lean along the slot by more than this.
+const END_CONTACTS: usize = 2;
+const END_LEAN: f64 = 0.5;
+/// A contact is off the outline at an end by this share of the ball's radius, typically, and by this much in direction.
+const END_OFF: f64 = 0.15;
+const END_TURNED: f64 = 0.3;
+/// One contact speaks against a shape by no more than this.
+const MOST_MISFIT: f64 = 9.0;
+/// A plane around the opening is square to the walls within 9°, and is there at this share of places beside them.
+const LAND: f64 = 0.988;
+const LAND_SHARE: f64 = 0.3;
+/// Places along each wall where the surface beside it is asked for.
+const PLACES: usize = 9;
+/// So many contacts make a floor.
+const FLOOR_CONTACTS: usize = 6;
+/// A floor's contacts lean less than this: 25°.
+const FLOOR_LEAN: f64 = 0.906;
+
+/// A straight wall, seen along an axis.
+struct Line {
+    /// ball centres on it, m
+    centres: Vec<Point2<f64>>,
+    touches: Vec<usize>,
+    /// a point of the line of centres, m
+    at: Point2<f64>,
+    /// unit normal into the air
+    normal: Vector2<f64>,
+}
+
+/// All slots and pockets that contacts show.
+///
+/// - `is_round`: by contact, whether it is on a wall that is round all around
+pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: &[bool]) -> Vec<Slot> {
+    let kept = thinned(touches);
+    let Some(radius) = kept.first().map(|&at| touches[at].radius) else { return Vec::new() };
+    let kept: Vec<usize> = kept.into_iter().filter(|&at| !is_round[at]).collect();
+    let planes = large_planes(parted);
+    let mut found: Vec<Slot> = Vec::new();
+    for axis in axes(parted, &planes, touches, &kept, radius) {
+        let upright: Vec<usize> =
+            kept.iter().copied().filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE).collect();
+        let view = View { parted, touches, axis, plane: tangent_basis(&axis), radius };
+        let groups = together(touches, &upright, TOGETHER * radius);
+        let lines: Vec<Line> = groups.iter().flat_map(|members| view.lines(members)).collect();
+        for (at, one) in lines.iter().enumerate() {
+            for other in &lines[..at] {
+                let Some(slot) = view.between(one, other) else { continue };
+                if found.iter().all(|known| !is_one(known, &slot)) {
+                    found.push(slot);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Voids are one when their middles are nearer than this share of the width.
+const ONE: f64 = 0.5;
+
+/// Whether two slots are one, seen from two sides or by walls in pieces.
+fn is_one(one: &Slot, other: &Slot) -> bool {
+    let middle = |slot: &Slot| slot.centre - slot.out * (slot.depth / 2.0);
+    (middle(one) - middle(other)).norm() < ONE * one.width.max(other.width)
+}
+
+/// Contacts seen along an axis.
+struct View<'a> {
+    parted: &'a Parted<'a>,
+    touches: &'a [ProbedPoint],
+    axis: Vector3<f64>,
+    /// unit vectors square to the axis
+    plane: [Vector3<f64>; 2],
+    /// of the ball, m
+    radius: f64,
+}
+
+/// A contact in the frame of a slot: x along it, y across, z along the axis.
+struct Local {
+    touch: usize,
+    /// of the ball's centre, m
+    x: f64,
+    y: f64,
+    /// of the contact, m
+    z: f64,
+    normal: Vector3<f64>,
+}
+
+/// One end of a slot.
+#[derive(Clone, Copy)]
+struct End {
+    /// where the slot ends along x, m, were it round and were it flat
+    at: [f64; 2],
+    /// how badly contacts fit either
+    costs: [f64; 2],
+}
+
+impl View<'_> {
+    /// The straight walls of some contacts, the longest first.
+    fn lines(&self, members: &[usize]) -> Vec<Line> {
+        let mut left = projected(self.touches, members, self.plane);
+        let mut rng = Pcg64::seed_from_u64(SEED);
+        let mut found = Vec::new();
+        while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
+            let step = left.len().div_ceil(COUNTED);
+            let mut best: Option<(usize, Point2<f64>, Vector2<f64>)> = None;
+            for start in (0..left.len()).step_by(left.len().div_ceil(STARTS)) {
+                for _ in 0..PARTNERS {
+                    let [p, q] = [&left[start], &left[rng.random_range(0..left.len())]];
+                    let Some(normal) = self.through(p, q) else { continue };
+                    let count = left.iter().step_by(step).filter(|one| self.is_on_line(one, &p.at, &normal)).count();
+                    if best.as_ref().is_none_or(|&(most, ..)| count > most) {
+                        best = Some((count, p.at, normal));
+                    }
+                }
+            }
+            let Some(line) = best.and_then(|(_, at, normal)| self.fitted_line(&left, at, normal)) else { break };
+            left.retain(|one| !line.touches.contains(&one.touch));
+            found.push(line);
+        }
+        found
+    }
+
+    /// Normal of the wall that two contacts may be on.
+    fn through(&self, p: &Projected, q: &Projected) -> Option<Vector2<f64>> {
+        let apart = q.at - p.at;
+        let length = apart.norm();
+        if length < LEAST_RADII * self.radius || p.normal.dot(&q.normal) < ALIKE {
+            return None;
+        }
+        let normal = Vector2::new(-apart.y, apart.x) / length;
+        let normal = normal * normal.dot(&p.normal).signum();
+        (normal.dot(&p.normal) > ALIKE && normal.dot(&q.normal) > ALIKE).then_some(normal)
+    }
+
+    fn is_on_line(&self, one: &Projected, at: &Point2<f64>, normal: &Vector2<f64>) -> bool {
+        (one.at - at).dot(normal).abs() < SEARCHED * self.radius && one.normal.dot(normal) > ALIKE
+    }
+
+    /// The line through contacts near one: those that hang together along it; `None` where they are too few.
+    fn fitted_line(&self, all: &[Projected], mut at: Point2<f64>, mut normal: Vector2<f64>) -> Option<Line> {
+        let mut line = None;
+        for _ in 0..3 {
+            let along = Vector2::new(normal.y, -normal.x);
+            let mut on: Vec<(f64, &Projected)> = all
+                .iter()
+                .filter(|one| self.is_on_line(one, &at, &normal))
+                .map(|one| ((one.at - at).dot(&along), one))
+                .collect();
+            on.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let run = on.chunk_by(|a, b| b.0 - a.0 < GAP_RADII * self.radius).max_by_key(|run| run.len())?;
+            let is_long = run.last()?.0 - run.first()?.0 > LEAST_RADII * self.radius;
+            if run.len() < LEAST || !is_long {
+                return None;
+            }
+            let count = run.len() as f64;
+            let middle = run.iter().map(|(_, one)| one.at.coords).sum::<Vector2<f64>>() / count;
+            let [mut xx, mut xy] = [0.0; 2];
+            for (_, one) in run {
+                let v = one.at.coords - middle;
+                xx += v.dot(&along).powi(2);
+                xy += v.dot(&along) * v.dot(&normal);
+            }
+            let turned = normal - along * (xy / xx);
+            (at, normal) = (Point2::from(middle), turned.normalize());
+            let centres = run.iter().map(|(_, one)| one.at).collect();
+            line = Some(Line { centres, touches: run.iter().map(|(_, one)| one.touch).collect(), at, normal });
+        }
+        line
+    }
+
+    /// The void between two walls that face each other.
+    fn between(&self, one: &Line, other: &Line) -> Option<Slot> {
+        let across = (one.normal - other.normal).try_normalize(0.0)?;
+        let gap = (other.at - one.at).dot(&across);
+        if one.normal.dot(&other.normal) > -PARALLEL || gap < 0.0 {
+            return None;
+        }
+        let along = Vector2::new(across.y, -across.x);
+        let span = |line: &Line| {
+            let x = line.centres.iter().map(|p| (p - one.at).dot(&along));
+            x.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        };
+        let [a, b] = [span(one), span(other)];
+        let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
+        let longest = (a[1] - a[0]).max(b[1] - b[0]);
+        if high - low < FACING * longest {
+            return None;
+        }
+        let origin = one.at + across * (gap / 2.0) + along * ((low + high) / 2.0);
+        let [e, g] = self.plane;
+        let in_space = |v: &Vector2<f64>| e * v.x + g * v.y;
+        let height = |&touch: &usize| self.touches[touch].point.coords.dot(&self.axis);
+        let heights = [one, other].map(|line| {
+            let z = line.touches.iter().map(height);
+            z.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)])
+        });
+        let (bottom, top) = (heights[0][0].min(heights[1][0]), heights[0][1].max(heights[1][1]));
+        if heights[0][0].max(heights[1][0]) > heights[0][1].min(heights[1][1]) + self.radius {
+            return None;
+        }
+        let void = Void {
+            view: self,
+            origin: Point3::from(in_space(&origin.coords) + self.axis * ((bottom + top) / 2.0)),
+            along: in_space(&along),
+            across: in_space(&across),
+            gap,
+            felt: (high - low) / 2.0,
+            reach: [a[0].min(b[0]), a[1].max(b[1])].map(|x| x - (low + high) / 2.0),
+            half_height: (top - bottom) / 2.0,
+        };
+        void.slot()
+    }
+}
+
+/// A void between two walls, in the frame of a slot.
+struct Void<'a> {
+    view: &'a View<'a>,
+    /// in the middle of what was felt of both walls, m, in O
+    origin: Point3<f64>,
+    /// unit vectors along and across it
+    along: Vector3<f64>,
+    across: Vector3<f64>,
+    /// between the lines of ball centres, m
+    gap: f64,
+    /// both walls were felt so far to either side, m
+    felt: f64,
+    /// one of them was felt from where to where, m
+    reach: [f64; 2],
+    /// half of the height over which the walls were felt, m
+    half_height: f64,
+}
+
+impl Void<'_> {
+    fn width(&self) -> f64 {
+        self.gap + 2.0 * self.view.radius
+    }
+
+    /// The contacts in it and around its ends.
+    fn contacts(&self) -> Vec<Local> {
+        let (r, w) = (self.view.radius, self.width());
+        let local = |(touch, contact): (usize, &ProbedPoint)| {
+            let (v, p) = (contact.centre - self.origin, contact.point - self.origin);
+            let to = |v: &Vector3<f64>| [v.dot(&self.along), v.dot(&self.across), v.dot(&self.view.axis)];
+            let ([x, y, _], z, normal) = (to(&v), to(&p)[2], Vector3::from(to(&contact.normal)));
+            let is_beside = x > self.reach[0] - w && x < self.reach[1] + w && y.abs() < self.gap / 2.0 + 0.3 * r;
+            (is_beside && !contact.is_rejected).then_some(Local { touch, x, y, z, normal })
+        };
+        self.view.touches.iter().enumerate().filter_map(local).collect()
+    }
+
+    /// Where the slot ends on one side, by the contacts that lean back from there.
+    fn end(&self, contacts: &[Local], sign: f64) -> Option<End> {
+        let (r, half) = (self.view.radius, self.gap / 2.0);
+        let is_of = |one: &&Local| {
+            let is_level = one.z.abs() < self.half_height + r && one.normal.z.abs() < SQUARE;
+            is_level && one.normal.x * sign < -END_LEAN && one.x * sign > self.felt - half.max(r)
+        };
+        let of_end: Vec<&Local> = contacts.iter().filter(is_of).collect();
+        // another slot may end beyond: what is nearest counts
+        let nearest = of_end.iter().map(|one| one.x * sign).fold(f64::INFINITY, f64::min);
+        let of_end: Vec<&Local> = of_end.into_iter().filter(|one| one.x * sign < nearest + half.max(0.5 * r)).collect();
+        if of_end.len() < END_CONTACTS {
+            return None;
+        }
+        let of_round = |one: &Local| one.x * sign - (half * half - one.y * one.y).max(0.0).sqrt();
+        let round = median(&mut of_end.iter().map(|one| of_round(one)).collect::<Vec<_>>())?;
+        let flat = median(&mut of_end.iter().map(|one| one.x * sign).collect::<Vec<_>>())?;
+        let cost = |off: f64, normal: Vector2<f64>, expected: Vector2<f64>| {
+            let misfit = (off / (END_OFF * r)).powi(2) + (normal - expected).norm_squared() / END_TURNED.powi(2);
+            misfit.min(MOST_MISFIT)
+        };
+        let mut costs = [0.0; 2];
+        for one in &of_end {
+            let normal = Vector2::new(one.normal.x * sign, one.normal.y).normalize();
+            let back = Vector2::new(-(half * half - one.y * one.y).max(0.0).sqrt(), -one.y);
+            costs[0] += cost(of_round(one) - round, normal, back.try_normalize(0.01 * r).unwrap_or(-Vector2::x()));
+            costs[1] += cost(one.x * sign - flat, normal, -Vector2::x());
+        }
+        Some(End { at: [(round + half + r) * sign, (flat + r) * sign], costs })
+    }
+
+    /// The slot or pocket; `None` where it is none.
+    fn slot(&self) -> Option<Slot> {
+        let width = self.width();
+        let contacts = self.contacts();
+        if self.has_island(&contacts) {
+            return None;
+        }
+        let ends = [1.0, -1.0].map(|sign| self.end(&contacts, sign));
+        let total = |shape: usize| ends.iter().flatten().map(|end| end.costs[shape]).sum::<f64>();
+        let shape = if total(0) <= total(1) { Ends::Round } else { Ends::Straight };
+        let [high, low] = [0, 1].map(|at| {
+            let reach = self.reach[1 - at];
+            ends[at].map_or(reach, |end| end.at[usize::from(shape == Ends::Straight)])
+        });
+        let length = high - low;
+        let (axis, middle) = (self.view.axis, self.origin + self.along * ((high + low) / 2.0));
+        let openings = [axis, -axis].map(|out| self.land(&middle, &out));
+        let out_at = match openings {
+            [Some(up), Some(down)] => usize::from(down.share > up.share),
+            [Some(_), None] => 0,
+            [None, Some(_)] => 1,
+            [None, None] => return None,
+        };
+        let (land, out) = (openings[out_at]?, if out_at == 0 { axis } else { -axis });
+        let floor = self.floor(&contacts, &middle, &out, [low, high]);
+        let opposite = openings[1 - out_at].filter(|_| floor.is_none());
+        let down = floor.map_or(opposite.map_or(self.half_height, |end| end.distance), |(_, distance)| distance);
+        let depth = land.distance + down;
+        let is_shut = floor.is_some() && ends.iter().all(Option::is_some);
+        let is_boxed = shape == Ends::Straight && ends.iter().all(Option::is_some);
+        let is_long = length > width * if is_boxed { LONG_BOX } else { LONG };
+        let is_pocket = !is_long && is_boxed && is_shut && length > SQUARISH * width;
+        let is_deep = width < depth * if is_shut { SHALLOW } else { WIDE };
+        (is_deep && (is_long || is_pocket)).then(|| Slot {
+            walls: Vec::new(),
+            ends: [None; 2],
+            shape,
+            centre: middle + out * land.distance,
+            out,
+            direction: self.along,
+            width,
+            length,
+            depth,
+            through: if floor.is_some() { Some(false) } else { opposite.map(|_| true) },
+            floor: floor.map(|(number, _)| number),
+            land: land.number,
+            is_boxed: is_pocket,
+            is_aslant: false,
+            area: length * depth,
+        })
+    }
+
+    /// Whether something stands between the walls.
+    fn has_island(&self, contacts: &[Local]) -> bool {
+        let r = self.view.radius;
+        let is_between = |one: &&Local| {
+            let is_inside = one.x.abs() < self.felt && one.y.abs() < self.gap / 2.0 - 0.5 * r;
+            is_inside && one.z.abs() < self.half_height && one.normal.y.abs() > ISLAND_LEAN
+        };
+        contacts.iter().filter(is_between).count() >= ISLAND
+    }
+
+    /// The plane, or the cylinder with the material inside, around the opening towards `out`.
+    fn land(&self, middle: &Point3<f64>, out: &Vector3<f64>) -> Option<Land> {
+        let (parted, r) = (self.view.parted, self.view.radius);
+        let farthest = self.half_height + r.max(0.3 * self.width());
+        let mut best: Option<Land> = None;
+        for number in 0..parted.segmentation.segments.len() {
+            let is_plane = parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > LAND);
+            if !parted.is_strong(number) || !(is_plane || parted.is_shaft(number)) {
+                continue;
+            }
+            let Some(distance) = parted.exit(number, middle, out) else { continue };
+            if distance < self.half_height - 0.5 * r || distance > farthest {
+                continue;
+            }
+            let around = parted.around(number);
+            let mut count = 0;
+            for (side, at) in [1.0, -1.0].into_iter().flat_map(|side| (0..PLACES).map(move |at| (side, at))) {
+                let x = self.felt * (2.0 * at as f64 / (PLACES - 1) as f64 - 1.0);
+                let y = side * (self.width() / 2.0 + r.min(0.3 * self.width()));
+                let beside = middle + self.along * x + self.across * y;
+                let Some(up) = parted.exit(number, &beside, out) else { continue };
+                let is_there = parted.segment_at(&around, &(beside + out * up), 0.5 * r) == Some(number);
+                count += usize::from(is_there);
+            }
+            let share = count as f64 / (2 * PLACES) as f64;
+            if share > LAND_SHARE && best.is_none_or(|best| share > best.share) {
+                best = Some(Land { number, distance, share });
+            }
+        }
+        best
+    }
+
+    /// The plane on which most of the contacts lie that face `out` between the walls, with its distance below the middle, m.
+    fn floor(
+        &self,
+        contacts: &[Local],
+        middle: &Point3<f64>,
+        out: &Vector3<f64>,
+        [low, high]: [f64; 2],
+    ) -> Option<(usize, f64)> {
+        let View { parted, touches, axis, radius, .. } = *self.view;
+        let side = axis.dot(out).signum();
+        let is_of = |one: &&Local| {
+            let is_inside = one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * radius;
+            is_inside && one.normal.z * side > FLOOR_LEAN && one.z * side < self.half_height
+        };
+        let of_floor: Vec<usize> = contacts.iter().filter(is_of).map(|one| one.touch).collect();
+        let on = |number: usize| of_floor.iter().filter(|&&at| is_on(parted, number, &touches[at])).count();
+        let is_level = |&number: &usize| parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > LAND);
+        let levels = (0..parted.segmentation.segments.len()).filter(is_level);
+        let counted = levels.map(|number| (number, on(number))).filter(|&(_, count)| count >= FLOOR_CONTACTS);
+        let (number, _) = counted.max_by_key(|&(number, count)| (count, usize::MAX - number))?;
+        Some((number, parted.exit(number, middle, &-out)?))
+    }
+}
+
+/// What is around an opening.
+#[derive(Clone, Copy)]
+struct Land {
+    /// of the segment
+    number: usize,
+    /// from the middle of the slot, m
+    distance: f64,
+    /// of the places beside the walls that are on it
+    share: f64,
+}
