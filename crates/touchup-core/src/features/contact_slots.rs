@@ -7,18 +7,18 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::contacts::{ALIKE, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned, together};
+use super::contacts::{ALIKE, Projected, SQUARE, TOGETHER, axes, large_planes, projected, thinned, together_along};
 use super::fit::Ends;
 use super::scene::Parted;
 use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
-use crate::numeric::{median, tangent_basis};
+use crate::numeric::{median, order_statistic, tangent_basis, without_repeats};
 use crate::stylus::ProbedPoint;
 
 /// A wall was touched by at least so many contacts …
 const LEAST: usize = 8;
 /// … over so many radii of the ball, without a gap of more than so many.
 const LEAST_RADII: f64 = 1.5;
-const GAP_RADII: f64 = 4.0;
+const GAP_RADII: f64 = 6.0;
 /// Contacts from which a wall is tried in one group, with so many others each, and those that are counted.
 const STARTS: usize = 48;
 const PARTNERS: usize = 12;
@@ -33,6 +33,10 @@ const SEARCHED: f64 = 0.1;
 const PARALLEL: f64 = 0.9945;
 /// They face each other over this share of the longer one.
 const FACING: f64 = 0.4;
+/// Contacts of one wall have no gap along the axis of more than so many radii.
+const LAYER_RADII: f64 = 2.5;
+/// Share of a wall's contacts above and below which its height is not counted: they may be outliers.
+const OUTER: f64 = 0.05;
 /// So many contacts on something between the walls make it two voids.
 const ISLAND: usize = 6;
 const ISLAND_LEAN: f64 = 0.7;
@@ -47,12 +51,18 @@ const MOST_MISFIT: f64 = 9.0;
 /// A plane around the opening is square to the walls within 9°, and is there at this share of places beside them.
 const LAND: f64 = 0.988;
 const LAND_SHARE: f64 = 0.3;
+/// It is beside a wall when the mesh is there within this share of the ball's radius, at one of these distances, in radii.
+const LAND_OFF: f64 = 0.3;
+const LAND_RADII: [f64; 3] = [0.5, 1.0, 2.0];
 /// Places along each wall where the surface beside it is asked for.
 const PLACES: usize = 9;
 /// So many contacts make a floor.
 const FLOOR_CONTACTS: usize = 6;
-/// A floor's contacts lean less than this: 25°.
+/// A floor's contacts lean less than 25°, and are no farther off its level than this share of the ball's radius.
 const FLOOR_LEAN: f64 = 0.906;
+const FLOOR_OFF: f64 = 0.2;
+/// It is below the walls' contacts by no more than so many radii: the ball rests on it beside them.
+const FLOOR_RADII: f64 = 3.0;
 
 /// A straight wall, seen along an axis.
 struct Line {
@@ -73,32 +83,23 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
     let Some(radius) = kept.first().map(|&at| touches[at].radius) else { return Vec::new() };
     let kept: Vec<usize> = kept.into_iter().filter(|&at| !is_round[at]).collect();
     let planes = large_planes(parted);
-    let mut found: Vec<Slot> = Vec::new();
+    let mut found: Vec<(usize, Slot)> = Vec::new();
     for axis in axes(parted, &planes, touches, &kept, radius) {
         let upright: Vec<usize> =
             kept.iter().copied().filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE).collect();
         let view = View { parted, touches, axis, plane: tangent_basis(&axis), radius };
-        let groups = together(touches, &upright, TOGETHER * radius);
+        let groups = together_along(touches, &upright, &axis, TOGETHER * radius);
         let lines: Vec<Line> = groups.iter().flat_map(|members| view.lines(members)).collect();
         for (at, one) in lines.iter().enumerate() {
             for other in &lines[..at] {
-                let Some(slot) = view.between(one, other) else { continue };
-                if found.iter().all(|known| !is_one(known, &slot)) {
-                    found.push(slot);
-                }
+                let count = one.touches.len() + other.touches.len();
+                found.extend(view.between(one, other).map(|slot| (count, slot)));
             }
         }
     }
-    found
-}
-
-/// Voids are one when their middles are nearer than this share of the width.
-const ONE: f64 = 0.5;
-
-/// Whether two slots are one, seen from two sides or by walls in pieces.
-fn is_one(one: &Slot, other: &Slot) -> bool {
-    let middle = |slot: &Slot| slot.centre - slot.out * (slot.depth / 2.0);
-    (middle(one) - middle(other)).norm() < ONE * one.width.max(other.width)
+    // of walls in pieces, and seen along several axes, those count that most contacts are on
+    found.sort_by_key(|(count, slot)| std::cmp::Reverse((slot.is_closed, *count)));
+    without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| one.holds(other) || other.holds(one))
 }
 
 /// Contacts seen along an axis.
@@ -119,6 +120,8 @@ struct Local {
     x: f64,
     y: f64,
     /// of the contact, m
+    contact_x: f64,
+    contact_y: f64,
     z: f64,
     normal: Vector3<f64>,
 }
@@ -227,10 +230,14 @@ impl View<'_> {
         let origin = one.at + across * (gap / 2.0) + along * ((low + high) / 2.0);
         let [e, g] = self.plane;
         let in_space = |v: &Vector2<f64>| e * v.x + g * v.y;
-        let height = |&touch: &usize| self.touches[touch].point.coords.dot(&self.axis);
         let heights = [one, other].map(|line| {
-            let z = line.touches.iter().map(height);
-            z.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)])
+            let height = |&touch: &usize| self.touches[touch].point.coords.dot(&self.axis);
+            let mut z: Vec<f64> = line.touches.iter().map(height).collect();
+            z.sort_by(f64::total_cmp);
+            // a wall beyond may lie on the same line
+            let run = z.chunk_by(|a, b| b - a < LAYER_RADII * self.radius).max_by_key(|run| run.len());
+            let mut run = run.unwrap_or_default().to_vec();
+            [0.0, 1.0].map(|end| order_statistic(&mut run, OUTER + end * (1.0 - 2.0 * OUTER)).unwrap_or_default())
         });
         let (bottom, top) = (heights[0][0].min(heights[1][0]), heights[0][1].max(heights[1][1]));
         if heights[0][0].max(heights[1][0]) > heights[0][1].min(heights[1][1]) + self.radius {
@@ -279,9 +286,10 @@ impl Void<'_> {
         let local = |(touch, contact): (usize, &ProbedPoint)| {
             let (v, p) = (contact.centre - self.origin, contact.point - self.origin);
             let to = |v: &Vector3<f64>| [v.dot(&self.along), v.dot(&self.across), v.dot(&self.view.axis)];
-            let ([x, y, _], z, normal) = (to(&v), to(&p)[2], Vector3::from(to(&contact.normal)));
+            let ([x, y, _], [contact_x, contact_y, z]) = (to(&v), to(&p));
+            let normal = Vector3::from(to(&contact.normal));
             let is_beside = x > self.reach[0] - w && x < self.reach[1] + w && y.abs() < self.gap / 2.0 + 0.3 * r;
-            (is_beside && !contact.is_rejected).then_some(Local { touch, x, y, z, normal })
+            (is_beside && !contact.is_rejected).then_some(Local { touch, x, y, contact_x, contact_y, z, normal })
         };
         self.view.touches.iter().enumerate().filter_map(local).collect()
     }
@@ -300,21 +308,29 @@ impl Void<'_> {
         if of_end.len() < END_CONTACTS {
             return None;
         }
-        let of_round = |one: &Local| one.x * sign - (half * half - one.y * one.y).max(0.0).sqrt();
-        let round = median(&mut of_end.iter().map(|one| of_round(one)).collect::<Vec<_>>())?;
-        let flat = median(&mut of_end.iter().map(|one| one.x * sign).collect::<Vec<_>>())?;
-        let cost = |off: f64, normal: Vector2<f64>, expected: Vector2<f64>| {
+        let half_width = self.width() / 2.0;
+        // contacts and not centres: a ball that fills the end hardly moves in it
+        let from_axis = |one: &Local| (half_width * half_width - one.contact_y.powi(2)).max(0.0).sqrt();
+        let axis_at = |one: &Local| one.contact_x * sign - from_axis(one);
+        let middle_of =
+            |place: &dyn Fn(&Local) -> f64| median(&mut of_end.iter().map(|one| place(one)).collect::<Vec<_>>());
+        let (round, flat) = (middle_of(&axis_at)?, middle_of(&|one| one.contact_x * sign)?);
+        let end_at = [
+            middle_of(&|one| one.x * sign - (half * half - one.y * one.y).max(0.0).sqrt())? + half_width,
+            middle_of(&|one| one.x * sign)? + r,
+        ];
+        let misfit = |off: f64, normal: &Vector2<f64>, expected: &Vector2<f64>| {
             let misfit = (off / (END_OFF * r)).powi(2) + (normal - expected).norm_squared() / END_TURNED.powi(2);
             misfit.min(MOST_MISFIT)
         };
         let mut costs = [0.0; 2];
         for one in &of_end {
             let normal = Vector2::new(one.normal.x * sign, one.normal.y).normalize();
-            let back = Vector2::new(-(half * half - one.y * one.y).max(0.0).sqrt(), -one.y);
-            costs[0] += cost(of_round(one) - round, normal, back.try_normalize(0.01 * r).unwrap_or(-Vector2::x()));
-            costs[1] += cost(one.x * sign - flat, normal, -Vector2::x());
+            let of_circle = -Vector2::new(from_axis(one), one.contact_y) / half_width;
+            costs[0] += misfit(axis_at(one) - round, &normal, &of_circle);
+            costs[1] += misfit(one.contact_x * sign - flat, &normal, &-Vector2::x());
         }
-        Some(End { at: [(round + half + r) * sign, (flat + r) * sign], costs })
+        Some(End { at: end_at.map(|at| at * sign), costs })
     }
 
     /// The slot or pocket; `None` where it is none.
@@ -335,22 +351,25 @@ impl Void<'_> {
         let (axis, middle) = (self.view.axis, self.origin + self.along * ((high + low) / 2.0));
         let openings = [axis, -axis].map(|out| self.land(&middle, &out));
         let out_at = match openings {
-            [Some(up), Some(down)] => usize::from(down.share > up.share),
+            [Some(up), Some(down)] => usize::from(down.distance < up.distance),
             [Some(_), None] => 0,
             [None, Some(_)] => 1,
             [None, None] => return None,
         };
         let (land, out) = (openings[out_at]?, if out_at == 0 { axis } else { -axis });
-        let floor = self.floor(&contacts, &middle, &out, [low, high]);
-        let opposite = openings[1 - out_at].filter(|_| floor.is_none());
-        let down = floor.map_or(opposite.map_or(self.half_height, |end| end.distance), |(_, distance)| distance);
+        let floor = self.floor(&contacts, &out, [low, high]);
+        let is_reached = |end: &Land| floor.is_none() && end.distance < self.half_height + self.view.radius;
+        let opposite = openings[1 - out_at].filter(is_reached);
+        let lowest = opposite.map_or(self.half_height, |end| end.distance);
+        let down = floor.as_ref().map_or(lowest, |(_, distance)| *distance);
         let depth = land.distance + down;
-        let is_shut = floor.is_some() && ends.iter().all(Option::is_some);
-        let is_boxed = shape == Ends::Straight && ends.iter().all(Option::is_some);
+        let is_through = if floor.is_some() { Some(false) } else { opposite.map(|_| true) };
+        let is_closed = ends.iter().all(Option::is_some);
+        let (is_shut, is_boxed) = (floor.is_some() && is_closed, shape == Ends::Straight && is_closed);
         let is_long = length > width * if is_boxed { LONG_BOX } else { LONG };
         let is_pocket = !is_long && is_boxed && is_shut && length > SQUARISH * width;
         let is_deep = width < depth * if is_shut { SHALLOW } else { WIDE };
-        (is_deep && (is_long || is_pocket)).then(|| Slot {
+        (is_closed && is_deep && (is_long || is_pocket)).then(|| Slot {
             walls: Vec::new(),
             ends: [None; 2],
             shape,
@@ -360,10 +379,12 @@ impl Void<'_> {
             width,
             length,
             depth,
-            through: if floor.is_some() { Some(false) } else { opposite.map(|_| true) },
-            floor: floor.map(|(number, _)| number),
+            through: is_through,
+            floor: None,
+            felt_floor: floor.map(|(touches, _)| touches).unwrap_or_default(),
             land: land.number,
             is_boxed: is_pocket,
+            is_closed,
             is_aslant: false,
             area: length * depth,
         })
@@ -382,7 +403,7 @@ impl Void<'_> {
     /// The plane, or the cylinder with the material inside, around the opening towards `out`.
     fn land(&self, middle: &Point3<f64>, out: &Vector3<f64>) -> Option<Land> {
         let (parted, r) = (self.view.parted, self.view.radius);
-        let farthest = self.half_height + r.max(0.3 * self.width());
+        let farthest = self.half_height + (2.0 * r).max(0.5 * self.width());
         let mut best: Option<Land> = None;
         for number in 0..parted.segmentation.segments.len() {
             let is_plane = parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > LAND);
@@ -390,18 +411,22 @@ impl Void<'_> {
                 continue;
             }
             let Some(distance) = parted.exit(number, middle, out) else { continue };
-            if distance < self.half_height - 0.5 * r || distance > farthest {
+            if distance < self.half_height - r || distance > farthest {
                 continue;
             }
             let around = parted.around(number);
+            let primitive = &parted.segment(number).primitive;
+            let is_there = |beside: Point3<f64>| {
+                let Some(up) = parted.exit(number, &beside, out) else { return false };
+                let place = beside + out * up;
+                let normal = primitive.distance_and_normal(&place).1;
+                around.closest(&place, LAND_OFF * r).is_some_and(|face| parted.facets.normal(face).dot(&normal) > ALIKE)
+            };
             let mut count = 0;
             for (side, at) in [1.0, -1.0].into_iter().flat_map(|side| (0..PLACES).map(move |at| (side, at))) {
                 let x = self.felt * (2.0 * at as f64 / (PLACES - 1) as f64 - 1.0);
-                let y = side * (self.width() / 2.0 + r.min(0.3 * self.width()));
-                let beside = middle + self.along * x + self.across * y;
-                let Some(up) = parted.exit(number, &beside, out) else { continue };
-                let is_there = parted.segment_at(&around, &(beside + out * up), 0.5 * r) == Some(number);
-                count += usize::from(is_there);
+                let beside = |off: f64| middle + self.along * x + self.across * (side * (self.width() / 2.0 + off));
+                count += usize::from(LAND_RADII.iter().any(|radii| is_there(beside(radii * r))));
             }
             let share = count as f64 / (2 * PLACES) as f64;
             if share > LAND_SHARE && best.is_none_or(|best| share > best.share) {
@@ -411,27 +436,23 @@ impl Void<'_> {
         best
     }
 
-    /// The plane on which most of the contacts lie that face `out` between the walls, with its distance below the middle, m.
-    fn floor(
-        &self,
-        contacts: &[Local],
-        middle: &Point3<f64>,
-        out: &Vector3<f64>,
-        [low, high]: [f64; 2],
-    ) -> Option<(usize, f64)> {
-        let View { parted, touches, axis, radius, .. } = *self.view;
-        let side = axis.dot(out).signum();
+    /// The contacts on the floor, with its distance below the middle, m.
+    fn floor(&self, contacts: &[Local], out: &Vector3<f64>, [low, high]: [f64; 2]) -> Option<(Vec<u32>, f64)> {
+        let r = self.view.radius;
+        let side = -self.view.axis.dot(out).signum();
+        let deepest = self.half_height + FLOOR_RADII * r;
         let is_of = |one: &&Local| {
-            let is_inside = one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * radius;
-            is_inside && one.normal.z * side > FLOOR_LEAN && one.z * side < self.half_height
+            let is_inside = one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * r;
+            is_inside
+                && one.normal.z * side < -FLOOR_LEAN
+                && one.z * side > self.half_height - 0.5 * r
+                && one.z * side < deepest
         };
-        let of_floor: Vec<usize> = contacts.iter().filter(is_of).map(|one| one.touch).collect();
-        let on = |number: usize| of_floor.iter().filter(|&&at| is_on(parted, number, &touches[at])).count();
-        let is_level = |&number: &usize| parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > LAND);
-        let levels = (0..parted.segmentation.segments.len()).filter(is_level);
-        let counted = levels.map(|number| (number, on(number))).filter(|&(_, count)| count >= FLOOR_CONTACTS);
-        let (number, _) = counted.max_by_key(|&(number, count)| (count, usize::MAX - number))?;
-        Some((number, parted.exit(number, middle, &-out)?))
+        let of_floor: Vec<&Local> = contacts.iter().filter(is_of).collect();
+        let level = median(&mut of_floor.iter().map(|one| one.z * side).collect::<Vec<_>>())?;
+        let on = of_floor.iter().filter(|one| (one.z * side - level).abs() < FLOOR_OFF * r);
+        let on: Vec<u32> = on.map(|one| one.touch as u32).collect();
+        (on.len() >= FLOOR_CONTACTS).then_some((on, level))
     }
 }
 

@@ -99,13 +99,34 @@ pub(super) fn axes(
     axes
 }
 
-/// Contacts that hang together.
+/// Contacts that hang together: no farther apart than `reach`, m.
 pub(super) fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -> Vec<Vec<usize>> {
-    let points: Vec<Point3<f64>> = numbers.iter().map(|&at| touches[at].point).collect();
+    hanging(numbers, |at| touches[at].point, reach, |_, _| true)
+}
+
+/// Contacts of walls along an axis that hang together, seen along it: one wall, whether it was felt from above, from below or from both.
+/// The normals of those that hang together directly are alike.
+pub(super) fn together_along(
+    touches: &[ProbedPoint],
+    numbers: &[usize],
+    axis: &Vector3<f64>,
+    reach: f64,
+) -> Vec<Vec<usize>> {
+    let seen = |at: usize| touches[at].point - axis * touches[at].point.coords.dot(axis);
+    hanging(numbers, seen, reach, |one, other| touches[one].normal.dot(&touches[other].normal) > ALIKE)
+}
+
+fn hanging(
+    numbers: &[usize],
+    place: impl Fn(usize) -> Point3<f64>,
+    reach: f64,
+    may_hang: impl Fn(usize, usize) -> bool,
+) -> Vec<Vec<usize>> {
+    let points: Vec<Point3<f64>> = numbers.iter().map(|&at| place(at)).collect();
     let grid = PointGrid::of(&points, 0..points.len(), reach);
     let mut sets = DisjointSets::of(points.len());
     for (at, point) in points.iter().enumerate() {
-        for other in grid.near(point, reach).filter(|&other| other < at) {
+        for other in grid.near(point, reach).filter(|&other| other < at && may_hang(numbers[at], numbers[other])) {
             sets.join(at as u32, other as u32);
         }
     }
@@ -113,5 +134,5 @@ pub(super) fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -
     for (at, &number) in numbers.iter().enumerate() {
         members.entry(sets.root(at as u32)).or_default().push(number);
     }
-    members.into_values().filter(|members| members.len() >= LEAST).collect()
+    members.into_values().collect()
 }

@@ -62,7 +62,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
-        let is_shut = slot.floor.is_some() || slot.ends.iter().all(Option::is_some);
+        let is_shut = slot.floor.is_some() || slot.is_closed;
         is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
     };
     let measured = slots.iter().map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
@@ -98,20 +98,16 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
 }
 
-/// Slots and pockets by contacts, and those of the mesh that are none of them.
+/// Slots and pockets by contacts, and those of the mesh that are none of them. What contacts show without its ends is left to the mesh
+/// where that has it too.
 fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
-    let is_new = |slot: &Slot| felt.iter().all(|one| !is_in_slot(one, slot));
-    let (slots, pockets) = (slots.into_iter().filter(is_new).collect(), pockets.into_iter().filter(is_new).collect());
-    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.clone().into_iter().partition(|one| one.is_boxed);
+    let is_better = |one: &&Slot| one.is_closed || slots.iter().chain(&pockets).all(|other| !other.holds(one));
+    let felt: Vec<Slot> = felt.iter().filter(is_better).cloned().collect();
+    let is_new = |slot: &Slot| felt.iter().all(|one| !one.holds(slot));
+    let (slots, pockets): (Vec<_>, Vec<_>) =
+        (slots.into_iter().filter(is_new).collect(), pockets.into_iter().filter(is_new).collect());
+    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.iter().cloned().partition(|one| one.is_boxed);
     ([felt_slots, slots].concat(), [felt_pockets, pockets].concat())
-}
-
-/// Whether the middle of a void is in a slot.
-fn is_in_slot(slot: &Slot, other: &Slot) -> bool {
-    let v = other.centre - other.out * (other.depth / 2.0) - slot.centre;
-    let across = slot.out.cross(&slot.direction);
-    let is_beside = v.dot(&across).abs() < slot.width / 2.0 && v.dot(&slot.direction).abs() < slot.length / 2.0;
-    is_beside && (-slot.depth..slot.depth * ALIKE).contains(&v.dot(&slot.out))
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
@@ -190,11 +186,26 @@ impl AxisEnd {
             let place = fitted.met(point, axis)?;
             Some((fitted.own_std_at(&place.value), place))
         };
-        let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number))).map(|(own_std, place)| {
-            let [common, shift] = measure.observed.systematic(&place.touches);
-            Self { place, own_std, systematic: common.hypot(shift) }
-        });
-        met.unwrap_or_else(|| Self { place: Measured { value: *point, ..Measured::default() }, ..Self::default() })
+        let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number)));
+        met.map_or_else(|| Self::unknown(point), |(own_std, place)| Self::at(measure, place, own_std))
+    }
+
+    /// Where the axis meets a plane that was felt; else `point`.
+    fn met(measure: &Measure, plane: &Fitted<Plane>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
+        let place = plane.met(point, axis);
+        place.map_or_else(
+            || Self::unknown(point),
+            |place| Self::at(measure, place.clone(), plane.own_std_at(&place.value)),
+        )
+    }
+
+    fn at(measure: &Measure, place: Measured<Point3<f64>>, own_std: Option<f64>) -> Self {
+        let [common, shift] = measure.observed.systematic(&place.touches);
+        Self { place, own_std, systematic: common.hypot(shift) }
+    }
+
+    fn unknown(point: &Point3<f64>) -> Self {
+        Self { place: Measured { value: *point, ..Measured::default() }, ..Self::default() }
     }
 
     /// As the place of a feature with a fitted surface.
@@ -312,7 +323,11 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
-    let floor = AxisEnd::on(measure, slot.floor, &(near - axis.value * slot.depth), &axis.value);
+    let bottom = near - axis.value * slot.depth;
+    let floor = match measure.felt_plane(&slot.felt_floor, &bottom, &axis.value) {
+        Some(felt) => AxisEnd::met(measure, &felt, &bottom, &axis.value),
+        None => AxisEnd::on(measure, slot.floor, &bottom, &axis.value),
+    };
     let centre = opening.centre(&fitted, Fit::middle_std);
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };
     let half = direction * (length / 2.0);

@@ -85,6 +85,12 @@ impl<'a> Measure<'a> {
         Some(fitted)
     }
 
+    /// The plane through touches, about square to `normal`; `None` where there are none.
+    pub fn felt_plane(&self, touches: &[u32], point: &Point3<f64>, normal: &Vector3<f64>) -> Option<Fitted<Plane>> {
+        let is_felt = !touches.is_empty();
+        is_felt.then(|| self.fitted(&Plane::new(*point, normal), touches.to_vec(), &[], Some(DRILLED)))
+    }
+
     /// The cylinder of a segment; `None` where it is none.
     pub fn shaft(&self, number: usize) -> Option<Fitted<Cylinder>> {
         let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else { return None };

@@ -38,14 +38,28 @@ pub(super) struct Slot {
     pub through: Option<bool>,
     /// number of the plane that is its floor
     pub floor: Option<usize>,
+    /// numbers of the touches on its floor, where contacts alone show it
+    pub felt_floor: Vec<u32>,
     /// number of the plane, or of the cylinder with the material inside, around the opening
     pub land: usize,
     /// whether both ends are closed by planes, so that it is no slot unless it is long
     pub is_boxed: bool,
+    /// whether both ends are there
+    pub is_closed: bool,
     /// whether a wall aslant closes an end: it is a recess of another outline
     pub is_aslant: bool,
     /// area over which the walls face each other, m²
     pub area: f64,
+}
+
+impl Slot {
+    /// Whether the middle of another void is in it.
+    pub fn holds(&self, other: &Self) -> bool {
+        let v = other.centre - other.out * (other.depth / 2.0) - self.centre;
+        let across = self.out.cross(&self.direction);
+        let is_beside = v.dot(&across).abs() < self.width / 2.0 && v.dot(&self.direction).abs() < self.length / 2.0;
+        is_beside && (-self.depth..0.0).contains(&v.dot(&self.out))
+    }
 }
 
 /// Walls are parallel within 6°.
@@ -110,7 +124,7 @@ pub(super) fn slots(parted: &Parted, walls: &[Wall], of_face: &[u32], borders: &
             }
             let Some((slot, share)) = between(parted, of_face, borders, &mut views, [i, j]) else { continue };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
-            let is_shut = slot.floor.is_some() && slot.ends.iter().all(Option::is_some);
+            let is_shut = slot.floor.is_some() && slot.is_closed;
             let widest = if is_shut { SHALLOW } else { WIDE };
             if is_slot && !slot.is_aslant && slot.width < widest * slot.depth {
                 slots.push(slot);
@@ -209,8 +223,10 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
         depth: up + down,
         through: Some(met.is_none()),
         floor,
+        felt_floor: Vec::new(),
         land,
         is_boxed: false,
+        is_closed: true,
         is_aslant: false,
         // flat walls that are there say more
         area: 0.0,
@@ -440,8 +456,10 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         depth: up + down,
         through: Some(met.is_none()),
         floor: flat_floor,
+        felt_floor: Vec::new(),
         land,
         is_boxed: flat == 2,
+        is_closed: ends.iter().all(Option::is_some),
         is_aslant,
         area,
     })
