@@ -59,6 +59,13 @@ const SAME: f64 = 0.12;
 /// is blurred, and steps of a hole or shaft differ by more.
 const SAME_WALL: f64 = 0.15;
 const SAME_WALL_OF_BALL: f64 = 0.35;
+/// Contacts among which a shaft is sought, at most, its radius in radii of the ball, and the share of a turn over which it was touched.
+const MOST_ON_SHAFT: usize = 800;
+const LARGE: f64 = 4.0;
+const SHAFT_TURN: f64 = 0.6;
+/// Pieces of one wall are about one axis within 6°, and no farther apart along it than this many of its radii.
+const ONE_AXIS: f64 = 0.9945;
+const APART: f64 = 1.0;
 /// Tolerance of the segment of such a wall, as a share of the ball's radius.
 const TOLERANCE: f64 = 0.05;
 
@@ -176,6 +183,42 @@ fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
     faces
 }
 
+impl ContactWalls {
+    fn add(&mut self, one: ContactCylinder) {
+        if !self.cylinders.iter().any(|other| is_same(other, &one)) {
+            self.cylinders.push(one);
+        }
+    }
+
+    /// Joins cylinders that go on one another: a bore that was felt in pieces is one.
+    fn join_pieces(&mut self, touches: &[ProbedPoint], radius: f64, group_of: &[u32]) {
+        let mut at = 0;
+        while at < self.cylinders.len() {
+            let is_piece = |other: &usize| goes_on(&self.cylinders[at], &self.cylinders[*other]);
+            let Some(piece) = (at + 1..self.cylinders.len()).find(is_piece) else {
+                at += 1;
+                continue;
+            };
+            let other = self.cylinders.remove(piece);
+            let one = &self.cylinders[at];
+            let ends = |wall: &ContactCylinder| wall.ends.map(|t| wall.surface.center() + wall.surface.axis() * t);
+            let [a, b] = [ends(one), ends(&other)];
+            let along = a.into_iter().flat_map(|p| b.map(|q| q - p)).max_by(|v, w| v.norm().total_cmp(&w.norm()));
+            let along = along.unwrap_or_default();
+            let axis = (along * along.dot(&one.surface.axis()).signum()).normalize();
+            let [e, g] = tangent_basis(&axis);
+            let middle = nalgebra::center(&one.surface.center(), &other.surface.center());
+            let rho = one.surface.radius - radius * if one.surface.concave { 1.0 } else { -1.0 };
+            let rho = if one.surface.concave { rho } else { -rho };
+            let circle = (Point2::new(middle.coords.dot(&e), middle.coords.dot(&g)), rho, one.turn.max(other.turn));
+            let numbers: Vec<u32> = one.touches.iter().chain(&other.touches).map(|&touch| touch as u32).collect();
+            if let Some(joint) = cylinder_of(touches, &numbers, &axis, circle, [e, g], radius, group_of) {
+                self.cylinders[at] = joint;
+            }
+        }
+    }
+}
+
 /// All walls that contacts show, those with the most contacts first.
 fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
     let kept = thinned(touches);
@@ -192,12 +235,21 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
         for members in together(touches, &walls, TOGETHER * radius) {
             for (one, on) in circles(touches, &members, &axis, radius, &group_of) {
                 on.iter().for_each(|&at| left[at] = false);
-                if !found.cylinders.iter().any(|other| is_same(other, &one)) {
-                    found.cylinders.push(one);
-                }
+                found.add(one);
+            }
+        }
+        // a shaft is touched in strips that are far apart
+        let walls: Vec<usize> = walls.into_iter().filter(|&at| left[at]).collect();
+        let some: Vec<usize> = walls.iter().copied().step_by(walls.len().div_ceil(MOST_ON_SHAFT).max(1)).collect();
+        for (one, on) in circles(touches, &some, &axis, radius, &group_of) {
+            let Cylinder { radius: of_wall, concave, .. } = one.surface;
+            if !concave && of_wall > LARGE * radius && one.turn > SHAFT_TURN {
+                on.iter().for_each(|&at| left[at] = false);
+                found.add(one);
             }
         }
     }
+    found.join_pieces(touches, radius, &group_of);
     let rest: Vec<usize> = free.into_iter().filter(|&at| left[at]).collect();
     for members in together(touches, &rest, TOGETHER * radius) {
         found.planes.extend(flat_walls(touches, members));
@@ -410,4 +462,18 @@ fn is_same(one: &ContactCylinder, other: &ContactCylinder) -> bool {
         && a.axis().dot(&b.axis()).abs() > ALIKE
         && (a.radius - b.radius).abs() < SAME * a.radius
         && aside < SAME * a.radius
+}
+
+/// Whether two cylinders are pieces of one wall, beside each other along its axis.
+fn goes_on(one: &ContactCylinder, other: &ContactCylinder) -> bool {
+    let (a, b) = (&one.surface, &other.surface);
+    let ends = other.ends.map(|t| b.center() + b.axis() * t - a.center());
+    let along = ends.map(|v| v.dot(&a.axis()));
+    let gap = (along[0].min(along[1]) - one.ends[1]).max(one.ends[0] - along[0].max(along[1]));
+    let aside = ends.map(|v| v.cross(&a.axis()).norm());
+    a.concave == b.concave
+        && a.axis().dot(&b.axis()).abs() > ONE_AXIS
+        && (a.radius - b.radius).abs() < SAME * a.radius
+        && aside[0].min(aside[1]) < SAME_WALL * a.radius
+        && gap < APART * a.radius
 }

@@ -33,6 +33,9 @@ const SURE_WIDTH: f64 = 25.0;
 /// A plane is worth telling from this area on, in squared diagonals.
 const LEAST_PLANE: f64 = 1e-3;
 
+/// A round wall is as wide as the ball within this share.
+const OF_BALL: f64 = 0.06;
+
 /// Finds the features of a mesh, measured by touches where there are any.
 ///
 /// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their place in it.
@@ -54,12 +57,19 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
+    // a wall of the ball's own width that nothing touched is the way that it took through what was not scanned
+    let of_ball = touches.iter().map(|touch| 2.0 * touch.radius).fold(0.0, f64::max);
+    let is_way_of_ball = |feature: &Feature| {
+        let width = feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
+        feature.fitted_to == FittedTo::Mesh && feature.touched == 0.0 && (width - of_ball).abs() < OF_BALL * of_ball
+    };
     let mut features = Vec::new();
     for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
         features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
+    features.retain(|feature| !is_way_of_ball(feature));
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
