@@ -1,10 +1,12 @@
 """python -m machined TOUCHUP OUT [--seeds A-B] [--worlds W,...] [--scanner cheap|good]: parts scanned, touched, refined and judged.
 
 Each part has its own folder: the true part, its scan and recording by `touchup simulate`, refined mesh, features and touches. A folder whose
-recording is there is refined again, not simulated again. Prints what was missed or invented, and a table.
+recording is there is refined again, not simulated again. Prints what was missed or invented, and a table; --json writes the same for
+`machined.plots` and `machined.failures`.
 """
 
 import argparse
+import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -19,6 +21,7 @@ def main():
     parser.add_argument("--worlds", default=",".join(WORLDS), help="worlds of touchup simulate; plain: none")
     parser.add_argument("--scanner", choices=["cheap", "good"])
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--json", type=Path, help="verdicts, one for each part")
     arguments = parser.parse_args()
     low, high = map(int, arguments.seeds.split("-"))
     worlds = [None if name == "plain" else name for name in arguments.worlds.split(",")]
@@ -30,7 +33,7 @@ def main():
         except Failed as failure:
             return f"{job[0]} {job[1] or 'plain'}: failed: {str(failure).strip()}"
 
-    totals, failed = Totals(), 0
+    totals, failed, verdicts = Totals(), 0, []
     with ThreadPoolExecutor(arguments.jobs) as pool:
         for result in pool.map(one, jobs):
             if isinstance(result, str):
@@ -38,8 +41,11 @@ def main():
                 print(result, flush=True)
                 continue
             totals.add(result)
+            verdicts.append(result.record())
             for line in result.lines():
                 print(line, flush=True)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(verdicts, indent=1))
     print(f"\n{totals.table()}\n{failed} of {len(jobs)} failed")
 
 

@@ -34,6 +34,40 @@ class Result:
     # of each feature the share of its wall that was touched
     shares: list
     verdict: Verdict
+    # name of its folder
+    folder: str
+
+    def record(self):
+        """As JSON has it."""
+        verdict, share_of = self.verdict, {id(feature): share for feature, share in zip(self.part.features, self.shares)}
+        in_pair = {id(true): found for true, found in verdict.pairs}
+
+        def place(feature):
+            of = (lambda name: feature.get(name)) if isinstance(feature, dict) else (lambda name: getattr(feature, name, None))
+            center, axis = of("center_mm"), of("axis")
+            return {"text": described(feature), "center_mm": np.asarray(center, float).tolist(), "axis": np.asarray(axis, float).tolist()}
+
+        required = [
+            {"kind": true.kind, "remark": true.remark, "touched": share_of[id(true)], "is_found": id(true) in in_pair} | place(true)
+            for true in verdict.required
+        ]
+        false = [{"kind": found["kind"], "fitted_to": found["fitted_to"]} | place(found) for found in verdict.false]
+        wrong_kind = [{"true": true.kind, "found": found["kind"]} | place(true) for true, found in verdict.wrong_kind]
+        errors = [
+            {"kind": kind, "number": number, "error_mm": error, "std_mm": std}
+            for (kind, number), values in verdict.errors.items()
+            for error, std in values
+            if np.isfinite(std)
+        ]
+        return {
+            "folder": self.folder,
+            "world": self.world,
+            "required": required,
+            "false": false,
+            "wrong_kind": wrong_kind,
+            "errors": errors,
+            "bounds": {"above": verdict.bounds[0], "all": verdict.bounds[1]},
+        }
 
     def lines(self):
         """What went wrong, one line each."""
@@ -161,4 +195,4 @@ def part_run(touchup, out, seed, world, scanner):
     fits = [feature.entry_mm > 2 * radius + ROOM_MM for feature in part.features]
     required = [not f.is_optional and fit and share > TOUCHED for f, fit, share in zip(part.features, fits, shares)]
     name = f"{seed} {family} {world or 'plain'}"
-    return Result(name, world or "plain", part, shares, judge(features, part.features, required))
+    return Result(name, world or "plain", part, shares, judge(features, part.features, required), folder.name)

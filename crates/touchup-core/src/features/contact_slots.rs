@@ -48,6 +48,8 @@ const END_OFF: f64 = 0.15;
 const END_TURNED: f64 = 0.3;
 /// One contact speaks against a shape by no more than this.
 const MOST_MISFIT: f64 = 9.0;
+/// It is not deeper than so many of its lengths.
+const DEEPEST: f64 = 2.0;
 /// A plane around the opening is square to the walls within 9°, and is there at this share of places beside them.
 const LAND: f64 = 0.988;
 const LAND_SHARE: f64 = 0.3;
@@ -87,7 +89,7 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
     for axis in axes(parted, &planes, touches, &kept, radius) {
         let upright: Vec<usize> =
             kept.iter().copied().filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE).collect();
-        let view = View { parted, touches, axis, plane: tangent_basis(&axis), radius };
+        let view = View { parted, touches, kept: &kept, axis, plane: tangent_basis(&axis), radius };
         let groups = together_along(touches, &upright, &axis, TOGETHER * radius);
         let lines: Vec<Line> = groups.iter().flat_map(|members| view.lines(members)).collect();
         for (at, one) in lines.iter().enumerate() {
@@ -98,7 +100,7 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
         }
     }
     // of walls in pieces, and seen along several axes, those count that most contacts are on
-    found.sort_by_key(|(count, slot)| std::cmp::Reverse((slot.is_closed, *count)));
+    found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| one.holds(other) || other.holds(one))
 }
 
@@ -106,6 +108,8 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
 struct View<'a> {
     parted: &'a Parted<'a>,
     touches: &'a [ProbedPoint],
+    /// those to look at
+    kept: &'a [usize],
     axis: Vector3<f64>,
     /// unit vectors square to the axis
     plane: [Vector3<f64>; 2],
@@ -280,10 +284,11 @@ impl Void<'_> {
         self.gap + 2.0 * self.view.radius
     }
 
-    /// The contacts in it and around its ends.
-    fn contacts(&self) -> Vec<Local> {
+    /// Those of some contacts that are in it or around its ends.
+    fn contacts(&self, among: impl Iterator<Item = usize>) -> Vec<Local> {
         let (r, w) = (self.view.radius, self.width());
-        let local = |(touch, contact): (usize, &ProbedPoint)| {
+        let local = |touch: usize| {
+            let contact = &self.view.touches[touch];
             let (v, p) = (contact.centre - self.origin, contact.point - self.origin);
             let to = |v: &Vector3<f64>| [v.dot(&self.along), v.dot(&self.across), v.dot(&self.view.axis)];
             let ([x, y, _], [contact_x, contact_y, z]) = (to(&v), to(&p));
@@ -291,7 +296,7 @@ impl Void<'_> {
             let is_beside = x > self.reach[0] - w && x < self.reach[1] + w && y.abs() < self.gap / 2.0 + 0.3 * r;
             (is_beside && !contact.is_rejected).then_some(Local { touch, x, y, contact_x, contact_y, z, normal })
         };
-        self.view.touches.iter().enumerate().filter_map(local).collect()
+        among.filter_map(local).collect()
     }
 
     /// Where the slot ends on one side, by the contacts that lean back from there.
@@ -336,18 +341,19 @@ impl Void<'_> {
     /// The slot or pocket; `None` where it is none.
     fn slot(&self) -> Option<Slot> {
         let width = self.width();
-        let contacts = self.contacts();
+        let contacts = self.contacts(self.view.kept.iter().copied());
         if self.has_island(&contacts) {
             return None;
         }
-        let ends = [1.0, -1.0].map(|sign| self.end(&contacts, sign));
-        let total = |shape: usize| ends.iter().flatten().map(|end| end.costs[shape]).sum::<f64>();
+        // what is open at an end is left to the mesh
+        let ends = [self.end(&contacts, 1.0)?, self.end(&contacts, -1.0)?];
+        let total = |shape: usize| ends[0].costs[shape] + ends[1].costs[shape];
         let shape = if total(0) <= total(1) { Ends::Round } else { Ends::Straight };
-        let [high, low] = [0, 1].map(|at| {
-            let reach = self.reach[1 - at];
-            ends[at].map_or(reach, |end| end.at[usize::from(shape == Ends::Straight)])
-        });
+        let [high, low] = ends.map(|end| end.at[usize::from(shape == Ends::Straight)]);
         let length = high - low;
+        if length < SQUARISH * width {
+            return None;
+        }
         let (axis, middle) = (self.view.axis, self.origin + self.along * ((high + low) / 2.0));
         let openings = [axis, -axis].map(|out| self.land(&middle, &out));
         let out_at = match openings {
@@ -357,19 +363,19 @@ impl Void<'_> {
             [None, None] => return None,
         };
         let (land, out) = (openings[out_at]?, if out_at == 0 { axis } else { -axis });
-        let floor = self.floor(&contacts, &out, [low, high]);
+        let floor = self.floor(&self.contacts(0..self.view.touches.len()), &out, [low, high]);
         let is_reached = |end: &Land| floor.is_none() && end.distance < self.half_height + self.view.radius;
         let opposite = openings[1 - out_at].filter(is_reached);
         let lowest = opposite.map_or(self.half_height, |end| end.distance);
         let down = floor.as_ref().map_or(lowest, |(_, distance)| *distance);
         let depth = land.distance + down;
         let is_through = if floor.is_some() { Some(false) } else { opposite.map(|_| true) };
-        let is_closed = ends.iter().all(Option::is_some);
-        let (is_shut, is_boxed) = (floor.is_some() && is_closed, shape == Ends::Straight && is_closed);
+        let (is_shut, is_boxed) = (floor.is_some(), shape == Ends::Straight);
         let is_long = length > width * if is_boxed { LONG_BOX } else { LONG };
-        let is_pocket = !is_long && is_boxed && is_shut && length > SQUARISH * width;
+        let is_pocket = !is_long && is_boxed && is_shut;
         let is_deep = width < depth * if is_shut { SHALLOW } else { WIDE };
-        (is_closed && is_deep && (is_long || is_pocket)).then(|| Slot {
+        // the undercut of a T-slot, seen along it, has walls and ends too
+        (is_deep && depth < DEEPEST * length && (is_long || is_pocket)).then(|| Slot {
             walls: Vec::new(),
             ends: [None; 2],
             shape,
@@ -384,7 +390,7 @@ impl Void<'_> {
             felt_floor: floor.map(|(touches, _)| touches).unwrap_or_default(),
             land: land.number,
             is_boxed: is_pocket,
-            is_closed,
+            is_closed: true,
             is_aslant: false,
             area: length * depth,
         })

@@ -33,8 +33,8 @@ const SURE_WIDTH: f64 = 25.0;
 /// A plane is worth telling from this area on, in squared diagonals.
 const LEAST_PLANE: f64 = 1e-3;
 
-/// A round wall is as wide as the ball within this share.
-const OF_BALL: f64 = 0.06;
+/// A round wall is as wide as the ball within these shares: the mesh is coarse.
+const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 
 /// Finds the features of a mesh, measured by touches where there are any.
 ///
@@ -61,7 +61,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let of_ball = touches.iter().map(|touch| 2.0 * touch.radius).fold(0.0, f64::max);
     let is_way_of_ball = |feature: &Feature| {
         let width = feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
-        feature.fitted_to == FittedTo::Mesh && feature.touched == 0.0 && (width - of_ball).abs() < OF_BALL * of_ball
+        feature.fitted_to == FittedTo::Mesh && feature.touched == 0.0 && OF_BALL.contains(&(width / of_ball))
     };
     let mut features = Vec::new();
     for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
@@ -108,15 +108,11 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
 }
 
-/// Slots and pockets by contacts, and those of the mesh that are none of them. What contacts show without its ends is left to the mesh
-/// where that has it too.
+/// Slots and pockets by contacts, and those of the mesh that are none of them.
 fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
-    let is_better = |one: &&Slot| one.is_closed || slots.iter().chain(&pockets).all(|other| !other.holds(one));
-    let felt: Vec<Slot> = felt.iter().filter(is_better).cloned().collect();
     let is_new = |slot: &Slot| felt.iter().all(|one| !one.holds(slot));
-    let (slots, pockets): (Vec<_>, Vec<_>) =
-        (slots.into_iter().filter(is_new).collect(), pockets.into_iter().filter(is_new).collect());
-    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.iter().cloned().partition(|one| one.is_boxed);
+    let [slots, pockets] = [slots, pockets].map(|found| found.into_iter().filter(is_new).collect::<Vec<_>>());
+    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.into_iter().partition(|one| one.is_boxed);
     ([felt_slots, slots].concat(), [felt_pockets, pockets].concat())
 }
 

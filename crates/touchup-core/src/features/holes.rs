@@ -152,9 +152,9 @@ fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
 fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
-    let is_whole = wall.coverage >= HOLE_COVERAGE && wall.filled >= FILLED;
-    // a ball that went around a wall was inside of it: what the mesh has there is a plug that nobody felt
+    // a ball that went around a wall was inside of it: what the mesh has there is a plug that nobody felt, and what it has not a gap
     let is_felt = wall.felt_turn > 0.0;
+    let is_whole = wall.coverage >= HOLE_COVERAGE && (is_felt || wall.filled >= FILLED);
     if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
         return None;
     }
@@ -175,7 +175,7 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         ((t - end.t).abs() < NEAR_END * radius).then_some((number, t))
     };
     let rim = on_land(&open);
-    let is_notch = is_notch(parted, wall, &open);
+    let is_notch = !is_felt && is_notch(parted, wall, &open);
     if is_notch && rim.is_none() {
         return None;
     }
