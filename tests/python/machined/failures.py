@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 from PIL import Image, ImageDraw
 
-from .sheet import SIZE, Camera, drawn
+from .sheet import SIZE, TOWARDS_EYE, Camera, drawn
 from .touched import into_part
 
 # around the place, mm
@@ -43,8 +43,6 @@ def view_along(axis):
     axis = np.array(axis) / np.linalg.norm(axis)
     aside = np.linalg.svd(axis[None])[2][1]
     towards = axis * np.cos(np.radians(30)) + aside * np.sin(np.radians(30))
-    from .sheet import TOWARDS_EYE
-
     return trimesh.geometry.align_vectors(towards, TOWARDS_EYE / np.linalg.norm(TOWARDS_EYE))[:3, :3]
 
 

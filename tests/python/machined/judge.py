@@ -127,5 +127,5 @@ def described(feature):
         names = [name for name in (*STATED, "through") if feature.get(name) is not None]
         sizes = " ".join(f"{name.removesuffix('_mm')} {feature[name]:.2f}" if name != "through" else f"through {feature[name]}" for name in names)
         return f"{feature['kind']} at {np.round(feature['center_mm'], 1)} along {np.round(feature.get('axis', []), 2)}: {sizes}, {feature.get('fitted_to')}"
-    sizes = {name: value for name, value in feature.sizes.items() if name != "direction"}
+    sizes = {name: value if isinstance(value, (bool, type(None))) else round(float(value), 2) for name, value in feature.sizes.items() if name != "direction"}
     return f"{feature.kind} {feature.remark} at {np.round(feature.center_mm, 1)} along {np.round(feature.axis, 2)}: {sizes}"

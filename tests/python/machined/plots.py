@@ -41,8 +41,9 @@ def bars(axes, shares, worlds, labels):
             low, high = wilson(count, of)
             axes.bar(x, share, 0.9 * width, color=COLOURS[number], label=world if at == 0 else None)
             axes.plot([x, x], [max(low, 0), min(high, 1)], color="black", linewidth=1)
-            axes.text(x, 0.02, f"{count}/{of}", rotation=90, ha="center", va="bottom", fontsize=7, color="white")
+            axes.text(x, -0.01, f"{count}/{of}", ha="center", va="top", fontsize=7, transform=axes.get_xaxis_transform())
     axes.set_xticks(range(len(labels)), labels)
+    axes.tick_params("x", pad=12, length=0)
 
 
 def found(axes, verdicts, worlds):
@@ -55,7 +56,7 @@ def found(axes, verdicts, worlds):
     bars(axes, shares, worlds, labels)
     axes.axhspan(FOUND, 1, color="0.85", zorder=0)
     axes.set(title="Required features that were found", ylabel="share", ylim=(0, 1.02))
-    axes.legend(fontsize=8, loc="lower right")
+    axes.legend(fontsize=8, loc="lower center", ncols=3, bbox_to_anchor=(0.5, -0.28), frameon=False)
 
 
 def invented(axes, verdicts, worlds):
@@ -87,7 +88,7 @@ def ratios(axes, verdicts, worlds):
             ends = ratio * np.sqrt(len(of) / chi2.ppf([0.975, 0.025], len(of)))
             axes.plot(ends, [y, y], color=COLOURS[number], linewidth=1.5)
             axes.plot(ratio, y, "o", color=COLOURS[number], markersize=5, label=world if at == 0 else None)
-            axes.text(8.5, y, f"{len(of)}", fontsize=7, va="center", color=COLOURS[number])
+            axes.text(1.01, y, f"{len(of)}", fontsize=7, va="center", color=COLOURS[number], transform=axes.get_yaxis_transform())
     axes.axvspan(*RATIO, color="0.85", zorder=0)
     axes.set_yticks(range(len(labels)), labels)
     axes.set(title="Error over stated standard deviation (rms; at the right their count)", xscale="log", xlim=(0.1, 10), xlabel="error / std")

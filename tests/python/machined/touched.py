@@ -66,7 +66,7 @@ class Result:
             "false": false,
             "wrong_kind": wrong_kind,
             "errors": errors,
-            "bounds": {"above": verdict.bounds[0], "all": verdict.bounds[1]},
+            "bounds": {"above": int(verdict.bounds[0]), "all": verdict.bounds[1]},
         }
 
     def lines(self):

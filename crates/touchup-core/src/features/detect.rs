@@ -70,6 +70,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     features.retain(|feature| !is_way_of_ball(feature));
+    let mut features = without_second_holes(features);
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
@@ -106,6 +107,48 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     let least = if parted.rounding.is_some() { ROUNDED_EDGE } else { ROUNDED_EDGE_MEASURED };
     let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
+}
+
+/// Holes are one bore when their axes are within 11°, no farther apart than this share of the diameter where they overlap, and as wide
+/// within that share.
+const ONE_AXIS: f64 = 0.98;
+const ONE_BORE: f64 = 0.15;
+
+/// Without holes that are another one again: seen from its other end, or in what the mesh has of a bore beside what was felt of it. Of two that
+/// with the most touches is kept, and the deeper one where both have none.
+fn without_second_holes(mut features: Vec<Feature>) -> Vec<Feature> {
+    let is_round = |feature: &Feature| matches!(feature.kind, Kind::Hole | Kind::Notch);
+    let depth = |feature: &Feature| feature.depth.as_ref().map_or(0.0, |depth| depth.value);
+    let touches = |feature: &Feature| feature.diameter.as_ref().map_or(0, |diameter| diameter.touches.len());
+    let is_second = |at: usize, of: usize| {
+        let (one, other) = (&features[at], &features[of]);
+        let rank = |feature: &Feature| (touches(feature), depth(feature));
+        let is_less = rank(one) < rank(other) || (rank(one) == rank(other) && at > of);
+        at != of && is_round(one) && is_round(other) && is_less && is_one_bore(one, other)
+    };
+    let first: Vec<usize> =
+        (0..features.len()).filter(|&at| !(0..features.len()).any(|of| is_second(at, of))).collect();
+    first.into_iter().map(|at| std::mem::take(&mut features[at])).collect()
+}
+
+/// Whether two holes overlap along one axis over more than half of the shorter one, and are as wide.
+fn is_one_bore(one: &Feature, other: &Feature) -> bool {
+    // from its bottom to its opening, and how wide
+    let bore = |feature: &Feature| {
+        let (axis, depth) = (feature.axis.as_ref()?.value, feature.depth.as_ref()?.value);
+        let bottom = feature.centre.value - axis * depth;
+        (depth > 0.0).then_some((bottom, axis, depth, feature.diameter.as_ref()?.value))
+    };
+    let (Some((bottom, axis, depth, wide)), Some(other)) = (bore(one), bore(other)) else { return false };
+    let (other_bottom, other_axis, other_depth, other_wide) = other;
+    let from = (other_bottom - bottom).dot(&axis);
+    let to = from + other_depth * other_axis.dot(&axis);
+    let overlap = from.max(to).min(depth) - from.min(to).max(0.0);
+    let middle = other_bottom + other_axis * (other_depth / 2.0) - bottom;
+    let aside = (middle - axis * middle.dot(&axis)).norm();
+    let near = ONE_BORE * wide.min(other_wide);
+    let is_along = axis.dot(&other_axis).abs() > ONE_AXIS;
+    is_along && overlap > 0.5 * depth.min(other_depth) && (wide - other_wide).abs() < near && aside < near
 }
 
 /// Slots and pockets by contacts, and those of the mesh that are none of them.
