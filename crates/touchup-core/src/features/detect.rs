@@ -381,8 +381,9 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let length = if is_fixed(Freedom::Second) { length } else { slot.length };
     let half = direction * (length / 2.0);
     let touched = if slot.walls.is_empty() {
-        let side = axis.value.cross(&direction) * (slot.width / 2.0) - axis.value * (slot.depth / 2.0);
-        let side = |sign: f64| [-half, half].map(|end| near + side.component_mul(&Vector3::repeat(sign)) + end);
+        let (middle, across) =
+            (near - axis.value * (slot.depth / 2.0), axis.value.cross(&direction) * (slot.width / 2.0));
+        let side = |sign: f64| [-half, half].map(|end| middle + across * sign + end);
         [1.0, -1.0].iter().map(|&sign| measure.observed.touched_along(&side(sign))).sum::<f64>() / 2.0
     } else {
         measure.observed.touched_share(&slot.walls)
