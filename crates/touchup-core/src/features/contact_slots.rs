@@ -11,7 +11,7 @@ use super::contacts::{ALIKE, Projected, SQUARE, TOGETHER, axes, large_planes, pr
 use super::fit::Ends;
 use super::scene::Parted;
 use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
-use crate::numeric::{median, order_statistic, tangent_basis, without_repeats};
+use crate::numeric::{distinct, median, order_statistic, tangent_basis, without_repeats};
 use crate::stylus::ProbedPoint;
 
 /// A wall was touched by at least so many contacts …
@@ -89,7 +89,7 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
     for axis in axes(parted, &planes, touches, &kept, radius) {
         let upright: Vec<usize> =
             kept.iter().copied().filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE).collect();
-        let view = View { parted, touches, kept: &kept, axis, plane: tangent_basis(&axis), radius };
+        let view = AxisView { parted, touches, kept: &kept, axis, plane: tangent_basis(&axis), radius };
         let groups = together_along(touches, &upright, &axis, TOGETHER * radius);
         let lines: Vec<Line> = groups.iter().flat_map(|members| view.lines(members)).collect();
         for (at, one) in lines.iter().enumerate() {
@@ -105,7 +105,7 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
 }
 
 /// Contacts seen along an axis.
-struct View<'a> {
+struct AxisView<'a> {
     parted: &'a Parted<'a>,
     touches: &'a [ProbedPoint],
     /// those to look at
@@ -132,15 +132,15 @@ struct Local {
 
 /// One end of a slot.
 #[derive(Clone, Copy)]
-struct End {
+struct SlotEnd {
     /// where the slot ends along x, m, were it round and were it flat
     at: [f64; 2],
     /// how badly contacts fit either
     costs: [f64; 2],
 }
 
-impl View<'_> {
-    /// The straight walls of some contacts, the longest first.
+impl AxisView<'_> {
+    /// The straight walls of some contacts, those with the most contacts first.
     fn lines(&self, members: &[usize]) -> Vec<Line> {
         let mut left = projected(self.touches, members, self.plane);
         let mut rng = Pcg64::seed_from_u64(SEED);
@@ -159,7 +159,8 @@ impl View<'_> {
                 }
             }
             let Some(line) = best.and_then(|(_, at, normal)| self.fitted_line(&left, at, normal)) else { break };
-            left.retain(|one| !line.touches.contains(&one.touch));
+            let taken = distinct(line.touches.iter().copied());
+            left.retain(|one| taken.binary_search(&one.touch).is_err());
             found.push(line);
         }
         found
@@ -263,7 +264,7 @@ impl View<'_> {
 
 /// A void between two walls, in the frame of a slot.
 struct Void<'a> {
-    view: &'a View<'a>,
+    view: &'a AxisView<'a>,
     /// in the middle of what was felt of both walls, m, in O
     origin: Point3<f64>,
     /// unit vectors along and across it
@@ -273,7 +274,7 @@ struct Void<'a> {
     gap: f64,
     /// both walls were felt so far to either side, m
     felt: f64,
-    /// one of them was felt from where to where, m
+    /// from where to where along it at least one of them was felt, m
     reach: [f64; 2],
     /// half of the height over which the walls were felt, m
     half_height: f64,
@@ -300,7 +301,7 @@ impl Void<'_> {
     }
 
     /// Where the slot ends on one side, by the contacts that lean back from there.
-    fn end(&self, contacts: &[Local], sign: f64) -> Option<End> {
+    fn end(&self, contacts: &[Local], sign: f64) -> Option<SlotEnd> {
         let (r, half) = (self.view.radius, self.gap / 2.0);
         let is_of = |one: &&Local| {
             let is_level = one.z.abs() < self.half_height + r && one.normal.z.abs() < SQUARE;
@@ -335,7 +336,7 @@ impl Void<'_> {
             costs[0] += misfit(axis_at(one) - round, &normal, &of_circle);
             costs[1] += misfit(one.contact_x * sign - flat, &normal, &-Vector2::x());
         }
-        Some(End { at: end_at.map(|at| at * sign), costs })
+        Some(SlotEnd { at: end_at.map(|at| at * sign), costs })
     }
 
     /// The slot or pocket; `None` where it is none.

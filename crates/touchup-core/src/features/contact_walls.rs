@@ -75,7 +75,6 @@ struct ContactCylinder {
     surface: Cylinder,
     /// along the axis from the centre of the surface, m: from the lowest to the highest contact
     ends: [f64; 2],
-    count: usize,
     /// share of a turn that they cover
     turn: f64,
     touches: Vec<usize>,
@@ -208,8 +207,8 @@ impl ContactWalls {
             let axis = (along * along.dot(&one.surface.axis()).signum()).normalize();
             let [e, g] = tangent_basis(&axis);
             let middle = nalgebra::center(&one.surface.center(), &other.surface.center());
-            let rho = one.surface.radius - radius * if one.surface.concave { 1.0 } else { -1.0 };
-            let rho = if one.surface.concave { rho } else { -rho };
+            let Cylinder { radius: of_wall, concave, .. } = one.surface;
+            let rho = if concave { of_wall - radius } else { -of_wall - radius };
             let circle = (Point2::new(middle.coords.dot(&e), middle.coords.dot(&g)), rho, one.turn.max(other.turn));
             let numbers: Vec<u32> = one.touches.iter().chain(&other.touches).map(|&touch| touch as u32).collect();
             if let Some(joint) = cylinder_of(touches, &numbers, &axis, circle, [e, g], radius, group_of) {
@@ -255,7 +254,7 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
         found.planes.extend(flat_walls(touches, members));
     }
     found.planes.sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
-    found.cylinders.sort_by_key(|one| std::cmp::Reverse(one.count));
+    found.cylinders.sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
     found
 }
 
@@ -445,7 +444,7 @@ fn cylinder_of(
     let of_axis = along(&surface.axis(), &surface.center());
     let ends = of_axis.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| [low.min(t), high.max(t)]);
     let touches = numbers.iter().map(|&number| number as usize).collect();
-    Some(ContactCylinder { surface, ends, count: numbers.len(), turn, touches })
+    Some(ContactCylinder { surface, ends, turn, touches })
 }
 
 /// How well the direction of an axis is known before its contacts are, rad: 3°.
