@@ -40,6 +40,18 @@ def demo(demo_folder):
     return Demo(json.loads((out / "features.json").read_text())["features"], touches, stamps)
 
 
+def test_all_of_the_plate_is_found_and_nothing_invented(demo_folder):
+    """The table of the demo, its step among it: an edge that the ball rolled over and rested in."""
+    found = json.loads((demo_folder / "summary.json").read_text())["found"]
+    of = {feature["name"]: feature for feature in found["features"]}
+    assert sorted(of) == ["blind hole", "boss", "slot", "step", "through-hole"]
+    assert all(feature["id"] is not None for feature in of.values())
+    assert found["invented"] == 0
+    step = of["step"]
+    print(f"step: {step['center_off_mm']:.3f} mm, {step['axis_off_deg']:.2f} deg off, {step['touched']:.0%} touched")
+    assert step["center_off_mm"] < 0.05 and step["axis_off_deg"] < 0.1 and step["touched"] > 0.8
+
+
 def of_kind(demo, kind):
     found = [feature for feature in demo.features if feature["kind"] == kind]
     assert len(found) == len(DRAWN[kind])

@@ -6,7 +6,7 @@
 //! circle goes through three centres. Directions of axes come of the planes of the part, on which holes stand square, and of
 //! the normals of contacts that no plane explains.
 
-use nalgebra::{Point2, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -280,10 +280,40 @@ fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane
             break;
         }
         left.retain(|at| members.binary_search(at).is_err());
-        found.push(ContactPlane { surface: plane, touches: members });
+        if !is_edge(touches, &members, &plane) {
+            found.push(ContactPlane { surface: plane, touches: members });
+        }
     }
     found
 }
+
+/// Whether contacts that lie on a plane are those of an edge: rolling around it moves the centre and hardly the contact, and in a corner
+/// the normal turns while the centre stays.
+fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
+    let radius = touches[members[0]].radius;
+    let basis = tangent_basis(&plane.normal());
+    let spread = |of: fn(&ProbedPoint) -> Vector3<f64>| -> Matrix2<f64> {
+        let seen = |&at: &usize| basis.map(|axis| of(&touches[at]).dot(&axis));
+        let all: Vec<Vector2<f64>> = members.iter().map(seen).map(Vector2::from).collect();
+        let mean = all.iter().sum::<Vector2<f64>>() / all.len() as f64;
+        all.iter().map(|v| (v - mean) * (v - mean).transpose()).sum::<Matrix2<f64>>() / all.len() as f64
+    };
+    let centres = spread(|touch| touch.centre.coords);
+    let eigen = centres.symmetric_eigen();
+    let across = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let wide = |spread: &Matrix2<f64>| across.dot(&(spread * across)).max(0.0).sqrt();
+    let moved = wide(&centres);
+    let is_rolled = moved > ROLLED * radius && wide(&spread(|touch| touch.point.coords)) < ROLLED_SHARE * moved;
+    let is_corner = moved < CORNER * radius && spread(|touch| touch.normal).trace() > CORNER_TURN.powi(2);
+    is_rolled || is_corner
+}
+
+/// Contacts of an edge: the centre moves by more than this many radii across it, the contact by less than this share of that. Contacts of
+/// a corner: the centre moves by less than this many radii across it while the normals turn by more, rad.
+const ROLLED: f64 = 0.05;
+const ROLLED_SHARE: f64 = 0.6;
+const CORNER: f64 = 0.1;
+const CORNER_TURN: f64 = 0.12;
 
 /// The plane through contacts; across what they do not determine their normals do.
 fn plane_through(touches: &[ProbedPoint], members: &[usize]) -> Option<Plane> {

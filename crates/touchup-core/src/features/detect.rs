@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::borders::{StraightEdge, borders, straight_edges, without_seams};
 use super::cones::add_cones;
+use super::contact_heads::{Head, head_of};
 use super::contact_slots::contact_slots;
 use super::contact_walls::add_contact_walls;
 use super::feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
@@ -41,9 +42,10 @@ const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 /// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their place in it.
 pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, tree);
-    let beside: Vec<_> = borders(&parted, &without_seams(&parted)).into_keys().collect();
-    parted.segmentation.join_planes(&parted.facets, beside.into_iter());
+    join_planes(&mut parted);
     let is_round = add_contact_walls(&mut parted, touches);
+    // contacts took faces from planes of the mesh that are the same ones
+    join_planes(&mut parted);
     let mut walls = Wall::all(&parted.facets, &parted.segmentation);
     add_cones(&mut parted, &mut walls);
     let of_face = without_seams(&parted);
@@ -70,7 +72,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     features.retain(|feature| !is_way_of_ball(feature));
-    let mut features = without_second_holes(features);
+    let mut features = with_heads(&measure, without_second_holes(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
@@ -94,6 +96,12 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
 }
 
+/// Joins planes that meet and are one.
+fn join_planes(parted: &mut Parted) {
+    let beside: Vec<_> = borders(parted, &without_seams(parted)).into_keys().collect();
+    parted.segmentation.join_planes(&parted.facets, beside.into_iter());
+}
+
 /// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge, which looks wider in a measured mesh …
 const ROUNDED_EDGE: f64 = 0.3;
 const ROUNDED_EDGE_MEASURED: f64 = 0.45;
@@ -107,6 +115,47 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
     let least = if parted.rounding.is_some() { ROUNDED_EDGE } else { ROUNDED_EDGE_MEASURED };
     let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
+}
+
+/// Holes, and the heads around them that contacts alone show; both are steps of one.
+fn with_heads(measure: &Measure, mut features: Vec<Feature>) -> Vec<Feature> {
+    for at in 0..features.len() {
+        let Some(head) = head_of(measure, &features[at]) else { continue };
+        let head = head_feature(measure, &head);
+        if features.iter().any(|known| is_same_head(known, &head)) {
+            continue;
+        }
+        let group = features[at].group.unwrap_or(features.len() as u32);
+        features[at].group = Some(group);
+        features.push(Feature { group: Some(group), ..head });
+    }
+    features
+}
+
+/// Whether a hole is a head that was found already.
+fn is_same_head(known: &Feature, head: &Feature) -> bool {
+    let wide = |feature: &Feature| feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
+    let near = 0.5 * wide(head);
+    let is_near = (known.centre.value - head.centre.value).norm() < near;
+    known.kind == Kind::Hole && is_near && (wide(known) - wide(head)).abs() < ONE_BORE * wide(head)
+}
+
+fn head_feature(measure: &Measure, head: &Head) -> Feature {
+    let axis = head.wall.axis(&head.out);
+    let on_axis = head.wall.surface.center();
+    let opening = AxisEnd::on(measure, Some(head.land), &on_axis, &axis.value);
+    let bottom = opening.place.value - axis.value * head.depth;
+    let floor = measure.felt_plane(&head.floor, &bottom, &axis.value);
+    let floor =
+        floor.map_or_else(|| AxisEnd::unknown(&bottom), |floor| AxisEnd::met(measure, &floor, &bottom, &axis.value));
+    let centre = opening.centre(&head.wall, |fit| fit.lateral_std(&opening.place.value));
+    Feature {
+        diameter: Some(head.wall.number(2.0 * head.wall.surface.radius, &[(Freedom::Size, 2.0)])),
+        depth: Some(between(&opening, &floor, &axis.value)),
+        axis: Some(axis),
+        walls: Some(Walls::Round(head.wall.surface)),
+        ..Feature::new(Kind::Hole, centre, 1.0, FittedTo::Touches)
+    }
 }
 
 /// Holes are one bore when their axes are within 11°, no farther apart than this share of the diameter where they overlap, and as wide
@@ -412,13 +461,19 @@ fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
     if is_touched { FittedTo::Touches } else { FittedTo::Mesh }
 }
 
+/// A place of a concave edge is touched when a touch is within a radius of where this share of it stands off both its walls.
+const IN_CORNER: f64 = 0.5;
+
 fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
-    let [a, b] = edge.planes.map(|number| measure.plane(number));
+    let [a, b] = edge.planes.map(|number| measure.plane_beside_edge(number));
     let (a, b) = (a?, b?);
     let std_at = |side: usize, point: &Point3<f64>| [&a, &b][side].confirmed()?.std_at(point);
     let touches = distinct(a.touches.iter().chain(&b.touches).copied());
     let (axis, _, found) = Feature::crossing([&a.surface, &b.surface], std_at, &edge.ends, edge.is_convex, touches)?;
-    let touched = measure.observed.touched_along(&[found.points[0], found.points[1]]);
+    // a ball that rests in a corner touches its walls one radius off the edge
+    let reached = if edge.is_convex { 0.0 } else { IN_CORNER * measure.observed.reach() };
+    let off = (a.surface.normal() + b.surface.normal()) * reached;
+    let touched = measure.observed.touched_along(&[found.points[0] + off, found.points[1] + off]);
     Some(Feature { axis: Some(axis), touched, fitted_to: fitted_to(&[&a, &b]), ..found })
 }
 

@@ -38,6 +38,10 @@ pub(super) struct Measure<'a> {
 const LEAST_TOUCHES: usize = 12;
 /// Touches around less of a turn than this are left to the mesh.
 const LEAST_TURN: f64 = 0.4;
+/// Touches on a plane that spread less than this share across their longest direction are left to the mesh; beside an edge they are enough when
+/// they spread over this share of what the mesh has.
+const LEAST_SPREAD: f64 = 0.1;
+const LEAST_STRIP: f64 = 0.4;
 /// Into so many parts a turn is divided.
 const PARTS: usize = 24;
 /// A wall touched over less than this many diameters of its height has its axis from the plane around it.
@@ -72,17 +76,37 @@ impl<'a> Measure<'a> {
             return Some(known.clone());
         }
         let guess = self.observed.parted.plane(number)?;
-        let touches = self.observed.touches_of(&[number]);
-        let is_enough =
-            |touches: &[u32]| touches.len() >= LEAST_TOUCHES && self.spread(touches, &guess.point()) > LEAST_TURN;
-        let touches = self.squarest(
-            touches,
-            |touch| (1.0 - touch.normal.dot(&guess.normal()).powi(2)).max(0.0).sqrt(),
-            is_enough,
-        );
-        let fitted = self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None);
+        // two lines far apart are as good as a field
+        let fitted = self.plane_by(number, guess, |[_, second, first]| second > LEAST_SPREAD * first);
         self.planes.borrow_mut().insert(number, fitted.clone());
         Some(fitted)
+    }
+
+    /// The plane of a segment beside an edge: a strip of touches along the edge places it, where it is wide beside what the mesh has of the
+    /// plane. `None` where the segment is none.
+    pub fn plane_beside_edge(&self, number: usize) -> Option<Fitted<Plane>> {
+        let plane = self.plane(number)?;
+        if plane.to == FittedTo::Touches {
+            return Some(plane);
+        }
+        let guess = self.observed.parted.plane(number)?;
+        let [_, of_mesh, _] = spreads(self.observed.of_mesh(&[number]).iter().map(|one| one.point - guess.point()));
+        let is_wide = |[_, second, _]: [f64; 3]| second > LEAST_STRIP * of_mesh;
+        let first = self.plane_by(number, guess, is_wide);
+        // a mesh rounds the corner between two walls and leans there: touches by the first plane are others than by the mesh
+        let is_felt = first.to == FittedTo::Touches;
+        Some(if is_felt { self.plane_by(number, &first.surface, is_wide) } else { first })
+    }
+
+    /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are enough.
+    fn plane_by(&self, number: usize, guess: &Plane, is_wide: impl Fn([f64; 3]) -> bool) -> Fitted<Plane> {
+        let spread = |touches: &[u32]| {
+            spreads(touches.iter().map(|&number| self.observed.touch(number).point - guess.point()))
+        };
+        let is_enough = |touches: &[u32]| touches.len() >= LEAST_TOUCHES && is_wide(spread(touches));
+        let lean = |touch: &ProbedPoint| (1.0 - touch.normal.dot(&guess.normal()).powi(2)).max(0.0).sqrt();
+        let touches = self.squarest(self.observed.touches_of(&[number]), lean, is_enough);
+        self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None)
     }
 
     /// The plane through touches, about square to `normal`; `None` where there are none.
@@ -231,13 +255,6 @@ impl<'a> Measure<'a> {
         let mut along: Vec<f64> = touches.iter().map(along).collect();
         let [lowest, highest] = [0.1, 0.9].map(|share| order_statistic(&mut along, share).unwrap_or(0.0));
         highest - lowest
-    }
-
-    /// How much the touches on a plane are spread in their second direction, beside the first.
-    fn spread(&self, touches: &[u32], about: &Point3<f64>) -> f64 {
-        let [_, second, first] = spreads(touches.iter().map(|&number| self.observed.touch(number).point - about));
-        // two lines far apart are as good as a field
-        if first > 0.0 { (second / first * 4.0).min(1.0) } else { 0.0 }
     }
 }
 

@@ -8,6 +8,7 @@ mod bodies;
 mod borders;
 pub mod clusters;
 mod cones;
+mod contact_heads;
 mod contact_slots;
 mod contact_walls;
 mod contacts;

@@ -129,6 +129,16 @@ impl<'a> Observed<'a> {
         !self.touches.is_empty()
     }
 
+    /// The touches that are no outliers, with their numbers.
+    pub fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
+        (0..).zip(self.touches).filter(|(_, touch)| !touch.is_rejected)
+    }
+
+    /// A place is touched when a touch is within this, m: the radius of the ball.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
     pub fn touch(&self, number: u32) -> &ProbedPoint {
         &self.touches[number as usize]
     }
