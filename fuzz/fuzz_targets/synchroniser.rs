@@ -30,6 +30,7 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
     let params = SyncParams {
         reorder_ns: i64::from(bytes.arbitrary::<u8>()?) * MS,
         largest_gap_ns: i64::from(bytes.arbitrary::<u8>()?) * MS,
+        wrench_drift: f64::from(bytes.arbitrary::<i8>()?) * 1e-6,
         capacity: 2 + usize::from(bytes.arbitrary::<u8>()?),
         ..SyncParams::default()
     };

@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
+use super::offsets::WrenchOffset;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use crate::diagnose::{InputFinding, InputMonitor};
@@ -57,6 +58,8 @@ struct Diagnosis {
     is_sound: bool,
     /// what was told of tip and scan, and by what
     told: ToldNumbers,
+    /// what scene and recording say together of the clocks
+    wrench_clock: Option<WrenchOffset>,
     /// the surest first
     findings: Vec<InputFinding>,
 }
@@ -107,9 +110,11 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
             }
         },
     )?;
-    let findings = monitor.into_inner().findings(&scan, &FaceTree::new(&scan));
+    let monitor = monitor.into_inner();
+    let wrench_clock = monitor.clock_offset().map(|found| WrenchOffset::of(&found, &scene.sync_params()));
+    let findings = monitor.findings(&scan, &FaceTree::new(&scan));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
-    let diagnosis = Diagnosis { is_sound: sure == 0, told, findings };
+    let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_clock, findings };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
     Ok(replayed.losses)

@@ -7,16 +7,21 @@ use serde::Serialize;
 
 use super::reported;
 use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
-use crate::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError};
+use crate::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError, SyncParams};
 
 reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
     #[derive(Clone, Copy)]
-    pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied_ns: i64) {
-        /// total offset: that which the scene applies, and the correction
-        wrench_offset_ms: f64 = found.offset * 1e3 + applied_ns as f64 * 1e-6,
+    pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
+        /// total offset: that which the scene applies, and the correction; where there is a drift, at the first sample
+        wrench_offset_ms: f64 =
+            found.drift.map_or(found.offset, |of| of.offset_at_first) * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
         /// standard uncertainty
         sigma_ms: f64 = found.sigma * 1e3,
+        /// total drift: that which the scene applies, and the correction
+        wrench_drift_ppm: f64 = (found.drift.map_or(0.0, |of| of.rate) + applied.wrench_drift) * 1e6,
+        /// standard uncertainty of the correction; none: no drift is seen
+        wrench_drift_sigma_ppm: Option<f64> = found.drift.map(|of| of.rate_sigma * 1e6),
         /// what it is estimated from
         evidence: ClockEvidence = found.evidence,
     }
@@ -24,12 +29,16 @@ reported! {
 
 impl fmt::Display for WrenchOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { wrench_offset_ms, sigma_ms, evidence } = *self;
-        write!(
-            f,
-            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {evidence} \
-             (sync.wrench_offset_ms; not applied)"
-        )
+        let Self { wrench_offset_ms, sigma_ms, wrench_drift_ppm, wrench_drift_sigma_ppm, evidence } = *self;
+        write!(f, "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose")?;
+        match wrench_drift_sigma_ppm {
+            None => write!(f, ", by {evidence} (sync.wrench_offset_ms; not applied)"),
+            Some(ppm_sigma) => write!(
+                f,
+                " at first, and to gain {wrench_drift_ppm:+.1} ± {ppm_sigma:.1} ppm, by {evidence} \
+                 (sync.wrench_offset_ms, sync.wrench_drift_ppm; not applied)"
+            ),
+        }
     }
 }
 

@@ -346,7 +346,7 @@ impl RefineArguments {
         let wrench_offset = monitor
             .clock_offset()
             .filter(|_| scene.clock.is_some())
-            .map(|found| WrenchOffset::of(&found, scene.sync_params().wrench_offset_ns));
+            .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
         let (run, input) = ((cost, [load_s, replay_s], live), (told, findings));
         let offsets = (wrench_offset, registration);
         let summary = RefineSummary::of(run, &replayed, pushes, &refiner, outcome, input, offsets);

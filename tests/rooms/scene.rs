@@ -260,7 +260,7 @@ refine: { mode: paper, contact_model: spring, alpha_m_per_n_s: 0.5, beta_per_n2_
 #[test]
 fn units_are_turned_into_si_once() {
     let scene = Scene::from_yaml(
-        "sync: { reorder_ms: 1.5, largest_gap_ms: 0, largest_jump_s: 2, wrench_offset_ms: -1.8, capacity: 10 }
+        "sync: { reorder_ms: 1.5, largest_gap_ms: 0, largest_jump_s: 2, wrench_offset_ms: -1.8, wrench_drift_ppm: 50, capacity: 10 }
 compensation:
   sensor_position_mm: [0, 0, 120]
   sensor_orientation_xyzw: [0, 0, 1, 0]
@@ -273,6 +273,7 @@ compensation:
         largest_gap_ns: 0,
         largest_jump_ns: 2_000_000_000,
         wrench_offset_ns: -1_800_000,
+        wrench_drift: 50e-6,
         capacity: 10,
     };
     assert_eq!(scene.sync_params(), expected);

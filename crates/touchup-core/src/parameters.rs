@@ -117,6 +117,7 @@ units! {
     MM_PER_M "mm/m" per 1e3;
     MM_PER_S2 "mm/s²" per 1e3;
     MS "ms" per 1e3;
+    PPM "ppm" per 1e6;
     PERCENT "%" per 100.0;
     N_PER_MM "N/mm" times 1e3;
     DEG "degrees" times std::f64::consts::PI / 180.0;

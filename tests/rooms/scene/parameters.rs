@@ -12,6 +12,7 @@ sync.reorder_ms ms 20 0 60000
 sync.largest_gap_ms ms 30 0 60000
 sync.largest_jump_s s 0.1 0 1e6
 sync.wrench_offset_ms ms 0 -60000 60000
+sync.wrench_drift_ppm ppm 0 -1000 1000
 sync.capacity messages 4096 2 1e6
 markers.positions_mm mm [[28,0,120],[-20,22,128],[-16,-26,140],[18,24,155],[-30,2,168],[6,-22,180]] -10000 10000
 markers.spring_hz Hz 12 0.001 1e6

@@ -214,11 +214,29 @@ fn the_offset_of_the_wrench_clock_is_taken_off() {
 }
 
 #[test]
+fn the_drift_of_the_wrench_clock_is_taken_off_from_the_first_wrench_that_the_next_confirms() {
+    // 500 ppm: half a millisecond in a second
+    let params = SyncParams { wrench_drift: 500e-6, wrench_offset_ns: MS, ..SyncParams::default() };
+    let after = [pose(999 * MS, 0.0), pose(1000 * MS, 1.0), wrench(1000 * MS + MS + MS / 2, 0.0)];
+    let first = [pose(0, 0.0), pose(MS, 1.0), wrench(MS, 0.0)];
+    for wild in [None, Some(wrench(i64::MAX, 0.0)), Some(wrench(i64::MIN, 0.0))] {
+        let messages: Vec<_> = wild.iter().chain(&first).chain(&[wrench(2 * MS, 0.0)]).chain(&after).copied().collect();
+        let (samples, _) = synchronised(params, &messages);
+        assert_eq!((samples[0].stamp_ns, samples[0].pose_ot.translation.x), (0, 0.0));
+        let last = samples[samples.len() - 1];
+        let by_hand_ns = 1000 * MS + MS / 2 - ((1000 * MS + MS / 2) as f64 * 500e-6) as i64;
+        assert!((last.stamp_ns - by_hand_ns).abs() <= 1, "{wild:?}: {} ns, not {by_hand_ns}", last.stamp_ns);
+    }
+}
+
+#[test]
 fn settings_without_meaning_are_refused() {
     let bad = [
         SyncParams { reorder_ns: -1, ..SyncParams::default() },
         SyncParams { largest_gap_ns: -1, ..SyncParams::default() },
         SyncParams { largest_jump_ns: i64::MIN, ..SyncParams::default() },
+        SyncParams { wrench_drift: f64::NAN, ..SyncParams::default() },
+        SyncParams { wrench_drift: 2e-3, ..SyncParams::default() },
         SyncParams { capacity: 1, ..SyncParams::default() },
         SyncParams { capacity: usize::MAX, ..SyncParams::default() },
     ];

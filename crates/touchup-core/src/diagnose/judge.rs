@@ -11,7 +11,7 @@ use super::places::{ALIKE, BallFit, ScanScale, extent_of};
 use super::shift::{ContactShift, best_shift};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::{NormalEquations, jackknife_variance};
-use crate::stylus::{ClockOffset, TipParams, TipShape, WrenchFrame};
+use crate::stylus::{ClockDrift, ClockOffset, TipParams, TipShape, WrenchFrame};
 
 /// Fewer presses say nothing.
 pub(super) const FEWEST_PRESSES: usize = 20;
@@ -403,11 +403,27 @@ impl InputJudge<'_> {
     }
 
     fn judge_clock(&self) -> Option<InputFinding> {
-        let ClockOffset { offset, sigma, evidence } = self.clock?;
-        let path = (offset.abs() - 3.0 * sigma) * USUAL_SPEED;
+        let ClockOffset { offset, sigma, drift, evidence } = self.clock?;
+        let largest = drift.map_or(offset.abs(), |of| of.offset_at_first.abs().max(of.offset_at_last.abs()));
+        let path = (largest - 3.0 * sigma) * USUAL_SPEED;
         let [ms, sigma_ms] = [offset, sigma].map(|x| x * 1e3);
-        let measured = format!("the wrench reads {ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {evidence}");
-        let remedy = "add it to sync.wrench_offset_ms";
+        let (measured, remedy) = match drift {
+            None => (
+                format!("the wrench reads {ms:+.1} ± {sigma_ms:.1} ms beyond the pose, by {evidence}"),
+                "add it to sync.wrench_offset_ms",
+            ),
+            Some(ClockDrift { rate, rate_sigma, offset_at_first, offset_at_last }) => {
+                let [first_ms, last_ms] = [offset_at_first, offset_at_last].map(|x| x * 1e3);
+                let [ppm, ppm_sigma] = [rate, rate_sigma].map(|x| x * 1e6);
+                (
+                    format!(
+                        "the clock of the wrench gains {ppm:+.1} ± {ppm_sigma:.1} ppm on that of the pose and reads \
+                         {first_ms:+.1} ± {sigma_ms:.1} ms beyond it at first, {last_ms:+.1} ms at last, by {evidence}"
+                    ),
+                    "add the first two to sync.wrench_drift_ppm and sync.wrench_offset_ms",
+                )
+            }
+        };
         let is_sure = path > LARGEST_PATH;
         (path > LARGEST_PATH / 2.0).then(|| InputFinding::new(InputCause::Delay, is_sure, measured, remedy))
     }

@@ -131,12 +131,13 @@ impl ClockEstimator {
         }
     }
 
-    /// The delay by all onsets so far; where they do not determine it, or the course of motion and force contradicts them, by that; `None`
+    /// The delay by all onsets so far; where they do not determine it, or the course of motion and force contradicts them or shows a drift, by that; `None`
     /// when neither does.
     pub fn offset(&self) -> Option<ClockOffset> {
         let (onsets, course) = (self.by_onsets(), self.course.offset());
         match (onsets, course) {
-            (Some(onsets), Some(course)) if !onsets.agrees(&course) => Some(course),
+            // onsets tell the mean of a clock that drifts
+            (Some(onsets), Some(course)) if course.drift.is_some() || !onsets.agrees(&course) => Some(course),
             (onsets, course) => onsets.or(course),
         }
     }
@@ -172,6 +173,7 @@ impl ClockEstimator {
         (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
             offset,
             sigma,
+            drift: None,
             evidence: ClockEvidence::Onsets(profiles.len()),
         })
     }

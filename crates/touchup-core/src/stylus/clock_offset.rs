@@ -7,12 +7,27 @@ use serde::Serialize;
 /// What the clock of the wrench reads beyond that of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// s; to be added to [`super::SyncParams::wrench_offset_ns`]
+    /// in the middle of what it is estimated from, s; to be added to [`super::SyncParams::wrench_offset_ns`] where there is no drift
     pub offset: f64,
     /// standard uncertainty, s
     pub sigma: f64,
+    /// where one is seen
+    pub drift: Option<ClockDrift>,
     /// what it is estimated from
     pub evidence: ClockEvidence,
+}
+
+/// What the clock of the wrench gains on that of the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ClockDrift {
+    /// s/s; to be added to [`super::SyncParams::wrench_drift`]
+    pub rate: f64,
+    /// standard uncertainty
+    pub rate_sigma: f64,
+    /// what it reads beyond the other at the first sample, s; to be added to [`super::SyncParams::wrench_offset_ns`]
+    pub offset_at_first: f64,
+    /// … and at the last, s
+    pub offset_at_last: f64,
 }
 
 /// What a delay is estimated from.

@@ -7,13 +7,16 @@
 //! **Lifting**: where there is a gap between ball and part there is no force (Signorini's condition, F ≥ 0, g ≥ 0, F g = 0). Read with a
 //! delay, the force is still there when the ball has left, and there before it comes: the mean of F(t + δ) g(t) is least at the delay. The gap is
 //! measured from where the ball was lowest along the force shortly before and after.
+//!
+//! **Drift**: two clocks of their own run at rates that differ by up to some 100 ppm, which is 30 ms after five minutes. The delay is
+//! then δ + ε (t − t̄), and the sums over all blocks are least at both.
 
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
 use super::ContactSample;
-use super::clock_offset::{ClockEvidence, ClockOffset, mean_period};
+use super::clock_offset::{ClockDrift, ClockEvidence, ClockOffset, mean_period};
 use crate::numeric::jackknife_variance;
 
 /// Delays that are tried: ± [`REACH`] steps of [`STEP_NS`].
@@ -44,6 +47,15 @@ const LEAST_SHARE: f64 = 0.7;
 const OTHER_DEPTH: f64 = 0.1;
 /// … when it is so many steps away.
 const OTHER_STEPS: usize = 10;
+/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so many; around the best so many steps on
+/// each side without one block.
+const LARGEST_RATE: f64 = 400e-6;
+const RATE_STEP: f64 = 5e-6;
+const MOST_RATES: i64 = 400;
+const NEAR_RATES: usize = 6;
+/// A drift is sure when it is so many of its standard uncertainties, and worth taking off when it gains this much, s.
+const SURE_SIGMAS: f64 = 5.0;
+const LEAST_GAIN: f64 = 8e-3;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 12e-3;
 
@@ -54,15 +66,18 @@ type OfDelays = [f64; DELAYS];
 #[derive(Clone, Copy, Debug)]
 struct DelayBlock {
     count: usize,
+    /// sum of their times, s
+    time: f64,
     sums: OfDelays,
     squares: OfDelays,
 }
 
 impl DelayBlock {
-    const EMPTY: Self = Self { count: 0, sums: [0.0; DELAYS], squares: [0.0; DELAYS] };
+    const EMPTY: Self = Self { count: 0, time: 0.0, sums: [0.0; DELAYS], squares: [0.0; DELAYS] };
 
     fn joined(mut self, other: &Self) -> Self {
         self.count += other.count;
+        self.time += other.time;
         for at in 0..DELAYS {
             self.sums[at] += other.sums[at];
             self.squares[at] += other.squares[at];
@@ -86,7 +101,9 @@ struct DelayBlocks {
 }
 
 impl DelayBlocks {
-    fn add(&mut self, values: &OfDelays) {
+    /// - `time`: of the instant, s.
+    fn add(&mut self, time: f64, values: &OfDelays) {
+        self.block.time += time;
         for (at, value) in values.iter().enumerate() {
             self.block.sums[at] += value;
             self.block.squares[at] += value * value;
@@ -101,32 +118,110 @@ impl DelayBlocks {
         }
     }
 
-    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the blocks.
+    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the blocks: one delay, or one that grows steadily
+    /// where that is sure.
     ///
     /// - `period`: between two samples, s.
-    fn offset(&self, period: f64, of_block: impl Fn(&DelayBlock) -> OfDelays) -> Option<ClockOffset> {
+    /// - `ends`: first and last sample, s.
+    fn offset(
+        &self,
+        period: f64,
+        ends: [f64; 2],
+        of_block: impl Fn(&DelayBlock) -> OfDelays,
+    ) -> Option<ClockOffset> {
         if self.blocks.len() < LEAST_BLOCKS {
             return None;
         }
-        let parts: Vec<OfDelays> = self.blocks.iter().map(of_block).collect();
-        let total: OfDelays = std::array::from_fn(|at| parts.iter().map(|part| part[at]).sum());
+        let parts = Parts::of(&self.blocks, of_block);
+        let drift = parts.drift().filter(|drift| is_sure(drift, parts.span()));
+        let rate = drift.map_or(0.0, |[rate, _]| rate);
+        let total = parts.total(rate, None);
         let offset = least(&total)?;
         let mean = total.iter().sum::<f64>() / DELAYS as f64;
         let lowest = total.iter().copied().fold(f64::INFINITY, f64::min);
         if lowest > LEAST_SHARE * mean || has_another(&total, lowest + OTHER_DEPTH * (mean - lowest)) {
             return None;
         }
-        let without = |part: &OfDelays| least(&std::array::from_fn(|at| total[at] - part[at]));
-        let without: Vec<f64> = parts.iter().map(without).collect::<Option<_>>()?;
+        let without = (0..parts.curves.len()).map(|at| least(&parts.total(rate, Some(at))));
+        let without: Vec<f64> = without.collect::<Option<_>>()?;
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
         // of the steps, and of the mean that a sensor takes over a period
         let sigma = jackknife_variance(&without).sqrt().hypot(step / 2.0).hypot(period / 2.0);
+        let at = |t: f64| offset + rate * (t - parts.middle);
+        let drift = drift.map(|[rate, rate_sigma]| ClockDrift {
+            rate,
+            rate_sigma,
+            offset_at_first: at(ends[0]),
+            offset_at_last: at(ends[1]),
+        });
         (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
             offset,
             sigma,
+            drift,
             evidence: ClockEvidence::Course(instants as f64 * every),
         })
+    }
+}
+
+/// What some blocks give, each with when it was.
+struct Parts {
+    /// of each block: its middle, s, and its values
+    curves: Vec<(f64, OfDelays)>,
+    /// mean of the times, s
+    middle: f64,
+}
+
+impl Parts {
+    fn of(blocks: &[DelayBlock], of_block: impl Fn(&DelayBlock) -> OfDelays) -> Self {
+        let curves: Vec<_> = blocks.iter().map(|block| (block.time / block.count.max(1) as f64, of_block(block))).collect();
+        let middle = curves.iter().map(|(time, _)| time).sum::<f64>() / curves.len().max(1) as f64;
+        Self { curves, middle }
+    }
+
+    /// From the first block to the last, s.
+    fn span(&self) -> f64 {
+        self.curves.first().zip(self.curves.last()).map_or(0.0, |(first, last)| last.0 - first.0)
+    }
+
+    /// Their sum at each delay in the middle, where the delay grows by `rate`.
+    fn total(&self, rate: f64, left_out: Option<usize>) -> OfDelays {
+        let mut total = [0.0; DELAYS];
+        for (_, (time, curve)) in self.curves.iter().enumerate().filter(|(at, _)| Some(*at) != left_out) {
+            let shift = rate * (time - self.middle) / (STEP_NS as f64 * 1e-9);
+            let mean = curve.iter().sum::<f64>() / DELAYS as f64;
+            // beyond what was tried nothing is known
+            let value = |at: i64| usize::try_from(at).ok().and_then(|at| curve.get(at)).copied().unwrap_or(mean);
+            let (whole, share) = (shift.floor(), shift - shift.floor());
+            for (at, sum) in total.iter_mut().enumerate() {
+                let before = at as i64 + whole as i64;
+                *sum += value(before) * (1.0 - share) + value(before + 1) * share;
+            }
+        }
+        total
+    }
+
+    /// The rate at which the least of the sum is least, and its standard uncertainty; `None` at an end of what is tried.
+    fn drift(&self) -> Option<[f64; 2]> {
+        // one step of the rate is one of the delay from end to end
+        let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);
+        let count = ((LARGEST_RATE / rate_step) as i64).min(MOST_RATES);
+        let rates: Vec<f64> = (-count..=count).map(|at| at as f64 * rate_step).collect();
+        let lowest = |rate: f64, left_out| self.total(rate, left_out).iter().copied().fold(f64::INFINITY, f64::min);
+        let best = |around: &[f64], left_out: Option<usize>| -> Option<(usize, f64)> {
+            let depths: Vec<f64> = around.iter().map(|rate| lowest(*rate, left_out)).collect();
+            let at = (0..depths.len()).min_by(|&a, &b| depths[a].total_cmp(&depths[b]))?;
+            let (before, after) = (depths.get(at.checked_sub(1)?)?, depths.get(at + 1)?);
+            Some((at, around[at] + parabola([*before, depths[at], *after]) * (around[1] - around[0])))
+        };
+        let (at, rate) = best(&rates, None)?;
+        let near = &rates[at.saturating_sub(NEAR_RATES)..(at + NEAR_RATES + 1).min(rates.len())];
+        // one block that moves the rate beyond what is near is a large part of its uncertainty
+        let of_one = |left_out: usize| best(near, Some(left_out)).map_or(near[0], |(_, rate)| rate);
+        let without: Vec<f64> = (0..self.curves.len()).map(of_one).collect();
+        // what a step of the delays hides
+        let of_steps = STEP_NS as f64 * 0.5e-9 / self.span().max(f64::MIN_POSITIVE);
+        Some([rate, jackknife_variance(&without).sqrt().hypot(of_steps)])
     }
 }
 
@@ -148,6 +243,8 @@ struct CourseSample {
 #[derive(Clone, Debug)]
 pub(super) struct CourseClock {
     held: VecDeque<CourseSample>,
+    /// stamps of the first and the last sample
+    ends_ns: Option<[i64; 2]>,
     next_ns: i64,
     sliding: DelayBlocks,
     lifting: DelayBlocks,
@@ -156,7 +253,7 @@ pub(super) struct CourseClock {
 impl Default for CourseClock {
     fn default() -> Self {
         let held = VecDeque::with_capacity(MOST_SAMPLES);
-        Self { held, next_ns: i64::MIN, sliding: DelayBlocks::default(), lifting: DelayBlocks::default() }
+        Self { held, ends_ns: None, next_ns: i64::MIN, sliding: DelayBlocks::default(), lifting: DelayBlocks::default() }
     }
 }
 
@@ -172,6 +269,7 @@ impl CourseClock {
             self.held.pop_front();
         }
         let (stamp_ns, position) = (tip.stamp_ns, tip.pose_ot.translation.vector);
+        self.ends_ns.get_or_insert([stamp_ns; 2])[1] = stamp_ns;
         self.held.push_back(CourseSample { stamp_ns, position, force_o: tip.force_o, is_in_contact });
         let oldest_ns = stamp_ns.saturating_sub(2 * SPAN_NS);
         // one before that stays: it shows that the course is as long
@@ -187,15 +285,17 @@ impl CourseClock {
 
     /// Compares the motion at `middle_ns` with the forces around it.
     fn add(&mut self, middle_ns: i64) {
+        let [first_ns, _] = self.ends_ns.unwrap_or_default();
+        let time = middle_ns.saturating_sub(first_ns) as f64 * 1e-9;
         let presses = self.held.iter().filter(|x| x.is_in_contact).count();
         if presses == self.held.len() {
             if let Some(values) = self.cosines(middle_ns) {
-                self.sliding.add(&values);
+                self.sliding.add(time, &values);
             }
         } else if presses > 0
             && let Some(values) = self.forces_at_gap(middle_ns)
         {
-            self.lifting.add(&values);
+            self.lifting.add(time, &values);
         }
     }
 
@@ -242,8 +342,9 @@ impl CourseClock {
     /// The delay; `None` where neither sliding nor lifting determines it, or the two differ.
     pub fn offset(&self) -> Option<ClockOffset> {
         let period = mean_period(self.held.iter().map(|x| x.stamp_ns));
-        let lifting = self.lifting.offset(period, |block| block.sums);
-        match (self.sliding.offset(period, DelayBlock::scatter), lifting) {
+        let ends = self.ends_ns.map(|[first, last]| [0.0, last.saturating_sub(first) as f64 * 1e-9])?;
+        let lifting = self.lifting.offset(period, ends, |block| block.sums);
+        match (self.sliding.offset(period, ends, DelayBlock::scatter), lifting) {
             (Some(sliding), Some(lifting)) => {
                 let surer = if sliding.sigma <= lifting.sigma { sliding } else { lifting };
                 sliding.agrees(&lifting).then_some(surer)
@@ -251,6 +352,13 @@ impl CourseClock {
             (sliding, lifting) => sliding.or(lifting),
         }
     }
+}
+
+/// Whether a drift is there for sure, and worth taking off.
+///
+/// - `span`: over which it was seen, s.
+fn is_sure([rate, sigma]: &[f64; 2], span: f64) -> bool {
+    rate.abs() > SURE_SIGMAS * sigma && rate.abs() * span > LEAST_GAIN
 }
 
 /// Whether a sum is least at two delays apart, both below `limit`.
@@ -264,7 +372,12 @@ fn has_another(sums: &OfDelays, limit: f64) -> bool {
 fn least(sums: &OfDelays) -> Option<f64> {
     let at = (0..DELAYS).min_by(|&a, &b| sums[a].total_cmp(&sums[b]))?;
     let (before, after) = (sums.get(at.checked_sub(1)?)?, sums.get(at + 1)?);
-    let bend = before - 2.0 * sums[at] + after;
-    let shift = if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+    let shift = parabola([*before, sums[at], *after]);
     Some((at as f64 - REACH as f64 + shift) * STEP_NS as f64 * 1e-9)
+}
+
+/// Where the parabola through three values is least, in steps from the middle one.
+fn parabola([before, middle, after]: [f64; 3]) -> f64 {
+    let bend = before - 2.0 * middle + after;
+    if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 }
 }

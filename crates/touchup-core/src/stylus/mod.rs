@@ -29,7 +29,7 @@ mod tip_shape;
 
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::ClockEstimator;
-pub use clock_offset::{ClockEvidence, ClockOffset};
+pub use clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
 pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
 pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};

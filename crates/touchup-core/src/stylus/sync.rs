@@ -10,6 +10,9 @@ use super::stream::Stream;
 use super::sync_params::{SyncCounts, SyncParams};
 use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
 
+/// Two wrenches in succession closer than this confirm each other, ns.
+const DRIFTS_FROM_NS: u64 = 10_000_000_000;
+
 /// Turns two streams of messages into one stream of samples, in order of time.
 ///
 /// Memory is bounded and allocated once, in [`Synchroniser::new`].
@@ -33,6 +36,9 @@ pub struct Synchroniser {
     params: SyncParams,
     poses: Stream<StampedPose>,
     wrenches: Stream<StampedWrench>,
+    /// stamp of the wrench from which its clock drifts: the first that the next one confirms; and of the one before
+    drifts_from_ns: Option<i64>,
+    last_wrench_ns: Option<i64>,
     finished: bool,
 }
 
@@ -58,7 +64,7 @@ impl Synchroniser {
     fn waiting(params: SyncParams, wait_ns: i64) -> Result<Self, SettingError> {
         params.check()?;
         let (poses, wrenches) = (Stream::new(params.capacity, wait_ns), Stream::new(params.capacity, wait_ns));
-        Ok(Self { params, poses, wrenches, finished: false })
+        Ok(Self { params, poses, wrenches, drifts_from_ns: None, last_wrench_ns: None, finished: false })
     }
 
     /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
@@ -82,10 +88,21 @@ impl Synchroniser {
         match message {
             Message::Pose(pose) => self.poses.push(pose, &self.params),
             Message::Wrench(wrench) => {
-                let stamp_ns = wrench.stamp_ns.saturating_sub(self.params.wrench_offset_ns);
+                let stamp_ns = self.on_clock_of_pose(wrench.stamp_ns);
                 self.wrenches.push(StampedWrench { stamp_ns, ..wrench }, &self.params)
             }
         }
+    }
+
+    /// The stamp of a wrench without the offset of its clock and without its drift.
+    fn on_clock_of_pose(&mut self, stamp_ns: i64) -> i64 {
+        let is_near = |last: &i64| stamp_ns.abs_diff(*last) < DRIFTS_FROM_NS;
+        // a first stamp that is wild would shift all others
+        let last = self.last_wrench_ns.replace(stamp_ns).filter(is_near);
+        self.drifts_from_ns = self.drifts_from_ns.or(last);
+        let since_ns = self.drifts_from_ns.map_or(0, |from_ns| stamp_ns.saturating_sub(from_ns));
+        let gained_ns = (since_ns as f64 * self.params.wrench_drift).round() as i64;
+        stamp_ns.saturating_sub(self.params.wrench_offset_ns.saturating_add(gained_ns))
     }
 
     /// Nothing more will come: what is held may go out.

@@ -6,7 +6,7 @@ use crate::parameters;
 
 parameters! {
     /// Settings of a [`super::Synchroniser`]; times in ns.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SyncParams in "sync" {
         /// How far a message may lag behind the newest stamp of its stream; also how long a sample is held back.
         ///
@@ -22,6 +22,10 @@ parameters! {
         largest_jump_ns: i64 = 0.1, "largest_jump_s" [S, 0, 1e6];
         /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
         wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
+        /// What the clock of the wrench gains on the clock of the pose, from the first wrench on; taken off its stamps beside the offset.
+        ///
+        /// Two computers without a common clock differ by 100 ppm: after five minutes 30 ms.
+        wrench_drift: f64 = 0.0, "wrench_drift_ppm" [PPM, -1000, 1000];
         /// How many messages of each stream are held.
         ///
         /// 4096 are four seconds at 1 kHz, half a megabyte.
