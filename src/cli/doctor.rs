@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::progress::WorkProgress;
 use super::offsets::WrenchOffset;
+use super::progress::WorkProgress;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use crate::diagnose::{InputFinding, InputMonitor};

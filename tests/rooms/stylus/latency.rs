@@ -37,7 +37,8 @@ fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
         // every seed its own delay, from -4 to 5.5 ms
         let truth = (seed as f64 - 9.0) * 0.5e-3;
         let found = estimated(SensorParams { wrench_clock: truth, ..SensorParams::default() }, seed);
-        let ClockOffset { offset, sigma, drift, evidence } = found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
+        let ClockOffset { offset, sigma, drift, evidence } =
+            found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
         println!("{seed}: {:.2} ms, found {:.2} ± {:.2} ms, {evidence}", truth * 1e3, offset * 1e3, sigma * 1e3);
         worst = worst.max((offset - truth).abs() / sigma);
         assert!(sigma < 1e-3 && drift.is_none(), "seed {seed}: {sigma} s, {drift:?}");

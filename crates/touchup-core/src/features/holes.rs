@@ -6,7 +6,7 @@ use super::rays::RayHit;
 use super::scene::Parted;
 use super::walls::Wall;
 use crate::mesh::{BoxQuery, FaceId};
-use crate::numeric::tangent_basis;
+use crate::numeric::{median, tangent_basis};
 
 /// A round hole.
 #[derive(Clone, Debug)]
@@ -367,6 +367,42 @@ fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
     is_round && wider.is_coaxial(wall, SAME_AXIS) && beyond < 0.0 && wider.gap(wall) < SAME_HOLE * wall.radius()
 }
 
+/// Whether the part is round about the axis of a wall below the shoulder at `foot` that it stands on, whatever of that was segmented: a shaft that
+/// was scanned badly, and touched in strips.
+fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
+    let (radius, axis, middle) = (wall.radius(), wall.axis, wall.at(foot));
+    let reach = Vector3::repeat(BELOW_RADII[1] * radius);
+    let mut query = BoxQuery::default();
+    parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut query);
+    let mut far: [Vec<f64>; BELOW_PARTS] = Default::default();
+    let [e, g] = tangent_basis(&axis);
+    for face in query.faces.iter().map(|face| face.0) {
+        let v = parted.facets.mesh.barycentre(FaceId(face)) - middle;
+        let below = -v.dot(&axis) * out;
+        let across = v - axis * v.dot(&axis);
+        let distance = across.norm();
+        let is_there =
+            BELOW.contains(&(below / radius)) && (BELOW_RADII[0]..BELOW_RADII[1]).contains(&(distance / radius));
+        if is_there && parted.facets.normal(face).dot(&across) > BELOW_RADIAL * distance {
+            let turn = across.dot(&g).atan2(across.dot(&e)) / std::f64::consts::TAU;
+            far[((turn * BELOW_PARTS as f64).floor() as i64).rem_euclid(BELOW_PARTS as i64) as usize].push(distance);
+        }
+    }
+    let mut of_parts: Vec<f64> = far.iter_mut().filter_map(|of| median(of)).collect();
+    let Some(usual) = median(&mut of_parts.clone()) else { return false };
+    of_parts.retain(|of| (of - usual).abs() < BELOW_ALIKE * usual);
+    of_parts.len() as f64 >= BELOW_SHARE * BELOW_PARTS as f64
+}
+
+/// Below a shoulder a part is round when in this share of so many parts of a turn there are faces this far below it and this far from the axis,
+/// all in radii of what stands on it, whose normals are radial within 20°, all as far from the axis within this share.
+const BELOW_PARTS: usize = 24;
+const BELOW_SHARE: f64 = 0.6;
+const BELOW: std::ops::Range<f64> = 0.1..1.0;
+const BELOW_RADII: [f64; 2] = [1.05, 3.0];
+const BELOW_RADIAL: f64 = 0.94;
+const BELOW_ALIKE: f64 = 0.1;
+
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
@@ -390,7 +426,8 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         let lid = lid.map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
-        let is_turned = walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out));
+        let is_turned =
+            walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out)) || is_round_below(parted, wall, foot, out);
         let foot = wall.at(foot);
         (height > 0.0).then_some(Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
     })

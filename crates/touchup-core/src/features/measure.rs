@@ -100,9 +100,8 @@ impl<'a> Measure<'a> {
 
     /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are enough.
     fn plane_by(&self, number: usize, guess: &Plane, is_wide: impl Fn([f64; 3]) -> bool) -> Fitted<Plane> {
-        let spread = |touches: &[u32]| {
-            spreads(touches.iter().map(|&number| self.observed.touch(number).point - guess.point()))
-        };
+        let spread =
+            |touches: &[u32]| spreads(touches.iter().map(|&number| self.observed.touch(number).point - guess.point()));
         let is_enough = |touches: &[u32]| touches.len() >= LEAST_TOUCHES && is_wide(spread(touches));
         let lean = |touch: &ProbedPoint| (1.0 - touch.normal.dot(&guess.normal()).powi(2)).max(0.0).sqrt();
         let touches = self.squarest(self.observed.touches_of(&[number]), lean, is_enough);

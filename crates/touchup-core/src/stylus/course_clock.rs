@@ -123,12 +123,7 @@ impl DelayBlocks {
     ///
     /// - `period`: between two samples, s.
     /// - `ends`: first and last sample, s.
-    fn offset(
-        &self,
-        period: f64,
-        ends: [f64; 2],
-        of_block: impl Fn(&DelayBlock) -> OfDelays,
-    ) -> Option<ClockOffset> {
+    fn offset(&self, period: f64, ends: [f64; 2], of_block: impl Fn(&DelayBlock) -> OfDelays) -> Option<ClockOffset> {
         if self.blocks.len() < LEAST_BLOCKS {
             return None;
         }
@@ -174,7 +169,8 @@ struct Parts {
 
 impl Parts {
     fn of(blocks: &[DelayBlock], of_block: impl Fn(&DelayBlock) -> OfDelays) -> Self {
-        let curves: Vec<_> = blocks.iter().map(|block| (block.time / block.count.max(1) as f64, of_block(block))).collect();
+        let curves: Vec<_> =
+            blocks.iter().map(|block| (block.time / block.count.max(1) as f64, of_block(block))).collect();
         let middle = curves.iter().map(|(time, _)| time).sum::<f64>() / curves.len().max(1) as f64;
         Self { curves, middle }
     }
@@ -253,7 +249,13 @@ pub(super) struct CourseClock {
 impl Default for CourseClock {
     fn default() -> Self {
         let held = VecDeque::with_capacity(MOST_SAMPLES);
-        Self { held, ends_ns: None, next_ns: i64::MIN, sliding: DelayBlocks::default(), lifting: DelayBlocks::default() }
+        Self {
+            held,
+            ends_ns: None,
+            next_ns: i64::MIN,
+            sliding: DelayBlocks::default(),
+            lifting: DelayBlocks::default(),
+        }
     }
 }
 
