@@ -161,7 +161,7 @@ fn head_under(
     let guess = Cylinder::new(on_axis + out * (level - depth / 2.0), out, wide, true);
     let found = fit(&guess, &observations, &params).ok()?;
     let touches = numbers.into_iter().zip(&found.used).filter(|&(_, used)| *used).map(|(touch, _)| touch).collect();
-    let surface = found.surface.clone();
+    let surface = found.surface;
     let wall = Fitted { surface, fit: Some(found), touches, to: FittedTo::Touches, is_confirmed: true };
     Some(Head { wall, floor: floor.into_iter().map(|one| one.touch).collect(), land, out: *out, depth })
 }

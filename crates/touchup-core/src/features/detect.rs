@@ -15,7 +15,7 @@ use super::observe::{NOT_ALIKE, Observed};
 use super::rims::{RoundOpening, rims};
 use super::scene::Parted;
 use super::slots::{Slot, slots};
-use super::walls::Wall;
+use super::walls::{ALL_AROUND, Wall};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
@@ -51,8 +51,12 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
     let holes = holes(&parted, &walls);
-    let (slots, pockets) =
+    let (mut slots, pockets) =
         with_felt(contact_slots(&parted, touches, &is_round), slots(&parted, &walls, &of_face, &borders));
+    // what was felt all around is no end of a slot
+    let felt_bores: Vec<&Wall> =
+        holes.iter().map(|hole| &walls[hole.wall]).filter(|wall| wall.felt_turn >= ALL_AROUND).collect();
+    slots.retain(|slot| felt_bores.iter().all(|wall| !is_slot_end(wall, std::slice::from_ref(slot))));
     let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| is_sure_plane(&parted, number));
     let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(is_sure).collect();
     let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
