@@ -251,6 +251,9 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f
     Measured { value: (from.place.value - to.place.value).dot(direction).abs(), std, touches, ..Measured::default() }
 }
 
+/// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in radii of the ball.
+const LEAN_SIGMAS: f64 = 3.0;
+
 /// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a guess: then it is as far as the
 /// wall was felt, and a lower bound.
 fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd, out: &Vector3<f64>) -> Measured<f64> {
@@ -261,12 +264,16 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
     let side = (to.place.value - from.place.value).dot(out).signum();
     let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
     // the ball is as high as its contact, or as its measured normal leans: whatever is less far
-    let of_wall = fitted.touches.iter().map(|&number| measure.observed.touch(number));
-    let of_wall = of_wall.map(|touch| [along(&touch.centre), along(&touch.point)]);
+    let of_wall = || fitted.touches.iter().map(|&number| measure.observed.touch(number));
+    let heights = of_wall().map(|touch| [along(&touch.centre), along(&touch.point)]);
     let (lowest, highest) =
-        of_wall.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| (low.min(a.max(b)), high.max(a.min(b))));
-    let begin = if is_felt[0] { 0.0 } else { lowest };
-    let end = if is_felt[1] { along(&to.place.value) } else { highest };
+        heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| (low.min(a.max(b)), high.max(a.min(b))));
+    // what rolled over the edge leans as others lean by friction and noise, and is farther than it seems
+    let leans: f64 = of_wall().map(|touch| touch.normal.dot(out).powi(2)).sum();
+    let radius = of_wall().map(|touch| touch.radius).fold(0.0, f64::max);
+    let beyond = LEAN_SIGMAS * (leans / fitted.touches.len().max(1) as f64).sqrt() * radius;
+    let begin = if is_felt[0] { 0.0 } else { lowest + beyond };
+    let end = if is_felt[1] { along(&to.place.value) } else { highest - beyond };
     Measured {
         value: (end - begin).max(0.0),
         touches: fitted.touches.clone(),

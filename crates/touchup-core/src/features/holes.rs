@@ -397,7 +397,7 @@ fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
 /// Below a shoulder a part is round when in this share of so many parts of a turn there are faces this far below it and this far from the axis,
 /// all in radii of what stands on it, whose normals are radial within 20°, all as far from the axis within this share.
 const BELOW_PARTS: usize = 24;
-const BELOW_SHARE: f64 = 0.6;
+const BELOW_SHARE: f64 = 0.75;
 const BELOW: std::ops::Range<f64> = 0.1..1.0;
 const BELOW_RADII: [f64; 2] = [1.05, 3.0];
 const BELOW_RADIAL: f64 = 0.94;
@@ -426,8 +426,8 @@ fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
         let lid = lid.map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
-        let is_turned =
-            walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out)) || is_round_below(parted, wall, foot, out);
+        let is_turned = walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out))
+            || parted.rounding.is_none() && is_round_below(parted, wall, foot, out);
         let foot = wall.at(foot);
         (height > 0.0).then_some(Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
     })
