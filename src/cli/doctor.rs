@@ -59,7 +59,7 @@ struct Diagnosis {
     /// what was told of tip and scan, and by what
     told: ToldNumbers,
     /// what scene and recording say together of the clocks
-    wrench_clock: Option<WrenchOffset>,
+    wrench_offset: Option<WrenchOffset>,
     /// the surest first
     findings: Vec<InputFinding>,
 }
@@ -111,10 +111,10 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
         },
     )?;
     let monitor = monitor.into_inner();
-    let wrench_clock = monitor.clock_offset().map(|found| WrenchOffset::of(&found, &scene.sync_params()));
+    let wrench_offset = monitor.clock_offset().map(|found| WrenchOffset::of(&found, &scene.sync_params()));
     let findings = monitor.findings(&scan, &FaceTree::new(&scan));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
-    let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_clock, findings };
+    let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_offset, findings };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
     Ok(replayed.losses)

@@ -140,7 +140,7 @@ def checked_scene(touchup, folder):
     # 3: surely wrong, which a clock that drifts is; 4: the recordings lose messages on purpose
     if done.returncode not in (0, 3, 4):
         raise Failed(done.stderr)
-    clock = json.loads(done.stdout)["wrench_clock"]
+    clock = json.loads(done.stdout)["wrench_offset"]
     if clock is None or clock["wrench_drift_sigma_ppm"] is None:
         return scene
     numbers = "".join(f"  {key}: {clock[key]}\n" for key in ("wrench_offset_ms", "wrench_drift_ppm"))

@@ -113,7 +113,7 @@ fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends(
 }
 
 /// The same motion for ten minutes, by a clock of the wrench that runs faster or slower: worked out by hand, it reads `late_ms` at first and
-/// gains `ppm`. What is found, taken off the stamps, leaves nothing.
+/// gains `ppm`.
 #[test]
 fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
     const LASTS_MS: i64 = 600_000;
