@@ -5,10 +5,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::{counted, reported};
-use crate::haptic::{RefineError, RefineParams, Refiner};
-use crate::live::{Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
+use crate::haptic::{RefineError, RefineParams};
+use crate::live::{Ended, Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::reconstruct::{Patcher, PatcherParams};
+use crate::reconstruct::PatcherParams;
 use crate::stylus::Sample;
 
 /// Room reserved for new faces.
@@ -98,19 +98,19 @@ impl Rates {
         }
     }
 
-    /// Ends the thread of the patch, if there is one; gives back both rates as they are after the last sample, and the lag between them.
+    /// Ends the thread of the patch, if there is one; gives back what there is after the last sample, and the lag of the patch.
     ///
     /// # Errors
     /// [`LiveError::Stopped`] when it ended before.
-    pub fn finish(self) -> Result<(Refiner, Option<Patcher>, Option<LiveSummary>), LiveError> {
+    pub fn finish(self) -> Result<(Ended, Option<LiveSummary>), LiveError> {
         let Self { engine, real_time, stopped } = self;
         if let Some(stopped) = stopped {
             return Err(stopped);
         }
         let counts = engine.counts();
-        let (refiner, patcher) = engine.finish()?;
+        let ended = engine.finish()?;
         let live = real_time.map(|real_time| LiveSummary::of(&real_time.behind, counts));
-        Ok((refiner, patcher, live))
+        Ok((ended, live))
     }
 }
 

@@ -320,11 +320,10 @@ impl RefineArguments {
         let findings = self.doubt(&monitor, &as_scanned, &tree, pushes.accepted)?;
         let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &tree)));
         drop(tree);
-        let (refiner, patcher, live) = rates.finish()?;
+        let (mut ended, live) = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
-        let counts = refiner.counts();
         let stage = WorkProgress::stage("reconstruct");
-        let patcher = patcher.filter(|_| counts.contacts > 0);
+        let patcher = ended.patcher.take().filter(|_| ended.refiner.counts().contacts > 0);
         if let Some(patcher) = patcher.as_ref().filter(|_| !self.force) {
             patcher.check_extent()?;
         }
@@ -336,8 +335,12 @@ impl RefineArguments {
             outside: cut.outside.as_ref(),
             must_change: !self.force,
         };
-        let outcome = places.write(&as_scanned, refiner.mesh(), patcher)?;
+        let outcome = match patcher {
+            Some(patcher) => places.write_patched(&as_scanned, patcher)?,
+            None => places.write_moved(&as_scanned, &ended.mesh())?,
+        };
         drop(stage);
+        let counts = ended.refiner.counts();
         debug!(?counts, "replayed");
         pushes.refused.extend(std::mem::take(&mut replayed.refused));
         if counts.outside_region > 0 {
@@ -349,7 +352,7 @@ impl RefineArguments {
             .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
         let (run, input) = ((cost, [load_s, replay_s], live), (told, findings));
         let offsets = (wrench_offset, registration);
-        let summary = RefineSummary::of(run, &replayed, pushes, &refiner, outcome, input, offsets);
+        let summary = RefineSummary::of(run, &replayed, pushes, &ended.refiner, outcome, input, offsets);
         Ok(Refined { repair, summary, losses: replayed.losses })
     }
 
@@ -385,7 +388,7 @@ impl RefineArguments {
             LeftOut { part: "markers", reason: "the recording is read for poses" },
         ];
         let unused = if self.markers_topic.is_some() { &unused[..1] } else { &unused };
-        let memory = Memory::of(rates.engine.refiner().footprint(), scan_bytes + rates.scan_bytes());
+        let memory = Memory::of(rates.engine.footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }
 

@@ -40,9 +40,9 @@ fn refined(scan: &TriMesh, samples: &[Sample]) -> (TriMesh, TriMesh) {
     for sample in samples {
         engine.push(sample).unwrap();
     }
-    let (refiner, patcher) = engine.finish().unwrap();
-    let patched = patcher.unwrap().patched(scan, &FaceTree::new(scan)).unwrap();
-    (refiner.mesh().clone(), patched.mesh)
+    let mut ended = engine.finish().unwrap();
+    let patched = ended.patcher.take().unwrap().patched(scan, &FaceTree::new(scan)).unwrap();
+    (ended.mesh().into_owned(), patched.mesh)
 }
 
 fn lowest(mesh: &TriMesh) -> f64 {

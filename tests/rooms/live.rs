@@ -194,7 +194,7 @@ fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
             .count()
     };
     println!("{} vertices of the scan moved for the moment", moved(&touching));
-    let (refiner, _) = live.finish().unwrap();
+    let refiner = live.finish().unwrap().refiner;
     assert_same(refiner.mesh(), &at_the_end);
     assert_eq!(moved(refiner.mesh()), 0);
 }
@@ -248,7 +248,7 @@ impl Kept {
 
 /// The result at the end equals that of all samples at once.
 fn assert_knows_all(stream: &PlateStream, live: Engine) {
-    let mut known = live.finish().unwrap().1.unwrap();
+    let mut known = live.finish().unwrap().patcher.unwrap();
     known.flush();
     let mut all_at_once = patcher(stream);
     contacts(stream).iter().for_each(|contact| all_at_once.push(contact));
@@ -477,7 +477,7 @@ fn undoing_while_touching_brings_the_mesh_back() {
     // the undone result is that of all strokes but the last at once …
     contacts[..last_stroke].iter().for_each(|contact| before.push(contact));
     before.flush();
-    let (mesh, rebuilt) = (live.refiner().mesh().clone(), live.finish().unwrap().1.unwrap());
+    let (mesh, rebuilt) = (live.refiner().mesh().clone(), live.finish().unwrap().patcher.unwrap());
     assert!(redone == triangles(&mesh));
     assert!(redone == whole(&stream, &rebuilt).0, "and redone what all of them make");
     let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;

@@ -176,12 +176,12 @@ impl NodeSession {
         let Self { folder, recorder, engine, .. } = self;
         let Unrecorded { messages, reason, .. } = recorder.finish();
         report.unrecorded = messages;
-        let (refiner, patcher) = engine.finish()?;
-        let patcher = patcher.filter(|_| refiner.counts().contacts > 0);
+        let mut ended = engine.finish()?;
+        let patcher = ended.patcher.take().filter(|_| ended.refiner.counts().contacts > 0);
         let [mesh, features, touches] =
             ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
         let files = ResultFiles { mesh, features: Some(features), touches: Some(touches) };
-        let outcome = files.write(setup, refiner.mesh(), patcher).inspect_err(|_| {
+        let outcome = files.write(setup, &ended.mesh(), patcher).inspect_err(|_| {
             if let Some(reason) = &reason {
                 tracing::error!("{messages} messages are not in the session's recording: {reason}");
             }
@@ -278,7 +278,10 @@ impl ResultFiles {
         let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
         let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
         let places = OutcomePlaces { mesh: &self.mesh, unit, features, touches, outside, must_change: false };
-        Ok(places.write(&setup.scan.0, refined, patcher)?)
+        Ok(match patcher {
+            Some(patcher) => places.write_patched(&setup.scan.0, patcher)?,
+            None => places.write_moved(&setup.scan.0, refined)?,
+        })
     }
 }
 

@@ -1,4 +1,5 @@
 mod counted;
+mod dense;
 mod dynamics;
 mod formulas;
 mod push;

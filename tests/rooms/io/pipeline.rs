@@ -244,8 +244,8 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     }
     sync.finish();
     take(&mut sync);
-    let (refiner, patcher) = engine.finish().unwrap();
-    let mut patcher = patcher.unwrap();
+    let ended = engine.finish().unwrap();
+    let (refiner, mut patcher) = (ended.refiner, ended.patcher.unwrap());
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let columns = patched.columns().into_iter();

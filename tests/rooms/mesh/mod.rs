@@ -1,3 +1,4 @@
 mod edit;
 mod journal;
 mod queries;
+mod simplified;

@@ -166,7 +166,7 @@ fn the_patch_of_the_region_is_that_of_the_whole_scan() {
         let refine = cut.cut.refine_params(scene.refine_params(WrenchFrame::Object).unwrap());
         let mut engine = Engine::new(cut.mesh.clone(), refine, Some(patch), Renewal::AtEnd).unwrap();
         touches(0.14).iter().for_each(|sample| assert!(engine.push(sample).is_ok()));
-        let mut patcher = engine.finish().unwrap().1.unwrap();
+        let mut patcher = engine.finish().unwrap().patcher.unwrap();
         patcher.flush();
         let patched = patcher.patched(&cut.mesh, &FaceTree::new(&cut.mesh)).unwrap();
         (cut, patched)

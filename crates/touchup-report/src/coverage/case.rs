@@ -45,7 +45,7 @@ fn refined(scene: &Scene, drawn: &DrawnWorld, plate: &Plate, messages: &[Message
     }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).try_for_each(|sample| engine.push(&sample).map(drop))?;
-    let mut patcher = engine.finish()?.1.ok_or(MeasureError::NothingMoves)?;
+    let mut patcher = engine.finish()?.patcher.ok_or(MeasureError::NothingMoves)?;
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan))?;
     Ok((patched, patcher))

@@ -185,9 +185,9 @@ fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits)
     let mut engine = engine?;
     let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest_s, |sample| engine.push(sample).map(drop));
     let (end_s, finished) = timed(|| -> Measured<_> {
-        let (refiner, patcher) = engine.finish()?;
-        let counts = *refiner.counts();
-        let Some(mut patcher) = patcher else { return Ok((counts, refiner.into_mesh())) };
+        let mut ended = engine.finish()?;
+        let counts = *ended.refiner.counts();
+        let Some(mut patcher) = ended.patcher.take() else { return Ok((counts, ended.mesh().into_owned())) };
         patcher.flush();
         Ok((counts, patcher.patched(scan, &FaceTree::new(scan))?.mesh))
     });

@@ -7,6 +7,7 @@
 //! [`Pace::is_patient`]
 //! [`Engine::push`] waits instead, and the mesh at each sample is the same on every machine.
 
+mod detail;
 mod error;
 mod gate;
 mod latency;
@@ -14,16 +15,18 @@ mod probed;
 mod renewals;
 mod worker;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
+use detail::Detail;
 pub use error::LiveError;
 pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
 pub use renewals::{LiveCounts, Pace};
-use touchup_core::haptic::{RefineParams, Refiner, Update};
+use touchup_core::haptic::{Footprint, RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, Sample};
@@ -51,6 +54,26 @@ pub enum Renewal {
 pub struct Engine {
     refiner: Refiner,
     patch: Reconstruction,
+    /// `None`: the haptic update works on the scan itself
+    detail: Option<Detail>,
+}
+
+/// What an [`Engine`] leaves behind.
+#[derive(Debug)]
+pub struct Ended {
+    /// the haptic update after the last sample
+    pub refiner: Refiner,
+    /// all that was touched; `None` without a patch
+    pub patcher: Option<Patcher>,
+    detail: Option<Detail>,
+}
+
+impl Ended {
+    /// The scan as the haptic update alone has moved it.
+    pub fn mesh(&self) -> Cow<'_, TriMesh> {
+        let moved = self.refiner.mesh();
+        self.detail.as_ref().map_or(Cow::Borrowed(moved), |detail| Cow::Owned(detail.moved_as(moved)))
+    }
 }
 
 #[derive(Debug)]
@@ -78,7 +101,11 @@ impl Engine {
         if patch.is_some() {
             refine.bias = refine.bias.or(refine.gate.map(|_| BiasParams::default()));
         }
-        let mut refiner = Refiner::new(mesh, refine)?;
+        // a mesh that is shown while it is touched has the ids of the scan
+        let is_shown = matches!(renewal, Renewal::Beside { .. });
+        let (working, detail) =
+            if is_shown { (mesh, None) } else { Detail::of(mesh, &mut refine).map_err(RefineError::from)? };
+        let mut refiner = Refiner::new(working, refine)?;
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
             (None, _) => Reconstruction::Without,
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
@@ -87,7 +114,7 @@ impl Engine {
                 Reconstruction::Beside(Box::new(Renewals::new(scan, patcher, pace, gate)?))
             }
         };
-        Ok(Self { refiner, patch })
+        Ok(Self { refiner, patch, detail })
     }
 
     /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due.
@@ -257,18 +284,24 @@ impl Engine {
         self.renewals().map(|renewals| renewals.counts).unwrap_or_default()
     }
 
-    /// Ends the thread, if there is one; gives both back.
+    /// Memory of the mesh under refinement, and of the scan that it stands for.
+    pub fn footprint(&self) -> Footprint {
+        let working = self.refiner.footprint();
+        Footprint { mesh: working.mesh + self.detail.as_ref().map_or(0, Detail::bytes), ..working }
+    }
+
+    /// Ends the thread, if there is one; gives back what there is after the last sample.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn finish(mut self) -> Result<(Refiner, Option<Patcher>), LiveError> {
+    pub fn finish(mut self) -> Result<Ended, LiveError> {
         self.catch_up()?;
         let patcher = match self.patch {
             Reconstruction::Without => None,
             Reconstruction::AtEnd(patcher) => Some(*patcher),
             Reconstruction::Beside(renewals) => Some(renewals.finish()?),
         };
-        Ok((self.refiner, patcher))
+        Ok(Ended { refiner: self.refiner, patcher, detail: self.detail })
     }
 
     fn renewals(&self) -> Option<&Renewals> {

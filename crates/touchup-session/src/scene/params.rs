@@ -127,7 +127,7 @@ impl Scene {
         };
         params.shape = self.tip_shape();
         if params.shape != TipShape::Ball {
-            params.roi = RoiSize::Radius(TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()));
+            params.set_scale(TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()));
         }
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan_noise();

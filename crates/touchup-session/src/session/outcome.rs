@@ -128,25 +128,21 @@ fn written_counts(mesh: &TriMesh) -> [usize; 2] {
 }
 
 impl OutcomePlaces<'_> {
-    /// Writes the refined mesh.
+    /// Writes a mesh without patch.
     ///
     /// - `scan`: unrefined.
-    /// - `refined`: as the haptic update left it; written where there is no patch.
-    /// - `patcher`: remeshes the touched part; `None` without `patch` in the scene, or when nothing was touched.
+    /// - `refined`: as the haptic update left it.
     ///
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
-    pub fn write(&self, scan: &TriMesh, refined: &TriMesh, patcher: Option<Patcher>) -> Result<Outcome, OutcomeError> {
-        let Some(patcher) = patcher else {
-            let moved_faces = moved_faces(scan, refined);
-            self.check_changed(moved_faces as usize)?;
-            let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
-            let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
-            write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
-            self.write_features(&[])?;
-            return Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) });
-        };
-        self.write_patched(scan, patcher)
+    pub fn write_moved(&self, scan: &TriMesh, refined: &TriMesh) -> Result<Outcome, OutcomeError> {
+        let moved_faces = moved_faces(scan, refined);
+        self.check_changed(moved_faces as usize)?;
+        let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
+        let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
+        write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
+        self.write_features(&[])?;
+        Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) })
     }
 
     fn check_changed(&self, changed_faces: usize) -> Result<(), OutcomeError> {
@@ -154,7 +150,10 @@ impl OutcomePlaces<'_> {
     }
 
     /// Remeshes the touched part of the scan and writes the result.
-    fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
+    ///
+    /// # Errors
+    /// [`OutcomeError`]; no file is left half written.
+    pub fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
         patcher.flush();
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;

@@ -1,0 +1,117 @@
+//! Cost of one sample on scans of any density: [`Engine::push`] for edges from a thirtieth of the tip's radius to twice that, and from
+//! 10 thousand to 5 million faces.
+//!
+//! A ball slides over a wavy plate in a raster at 1 kHz, with contacts a little below the scan. One line for each density and size:
+//! time to begin, times of a push, how many vertices a push may move, memory of the process. As a recording is replayed, as fast as
+//! samples can be read, with the patch made at the end; with `live` in real time, the patch on a thread of its own: how old the
+//! touches are that it shows, and how many of its renewals were late.
+//!
+//! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use touchup::haptic::{RefineParams, TipParams};
+use touchup::live::{Engine, Gate, Pace, Renewal};
+use touchup::mesh::FaceTree;
+use touchup::reconstruct::PatcherParams;
+use touchup::sim::wavy::{RADIUS, STIFFNESS, plate, slide_on};
+use touchup::stylus::Sample;
+
+/// Edge lengths, in radii of the tip.
+const EDGES: [f64; 6] = [1.0 / 30.0, 0.1, 0.25, 0.5, 1.0, 2.0];
+/// Smallest side of a plate, m: a raster on it turns after three radii.
+const SMALLEST_SIDE: f64 = 5.0 * RADIUS;
+/// Noise of the tracker on each axis, m.
+const NOISE: f64 = 0.03e-3;
+/// Assumed scan noise, m.
+const SCAN_NOISE: f64 = 0.3e-3;
+
+fn percentile(sorted: &[u64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share).round() as usize] as f64 * 1e-3
+}
+
+/// Evenly spread noise of the wanted standard deviation, the same each time.
+fn noisy(side: f64, i: usize) -> Sample {
+    let mut sample = slide_on(side, i, 0.8 * side);
+    let mut state = i as u64;
+    let mut draw = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
+    };
+    draw();
+    sample.pose_ot.translation.vector += Vector3::new(draw(), draw(), draw());
+    sample
+}
+
+/// Memory of the process, MB.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kilobytes =
+        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
+    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
+}
+
+fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
+    let side = edge * (faces as f64 / 2.0).sqrt();
+    if side < SMALLEST_SIDE {
+        return;
+    }
+    let mesh = plate(faces, side).expect("it can be counted");
+    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
+    let renewal = if is_live {
+        let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
+        Renewal::Beside { scan, pace: Pace::default(), room: 1 << 18, gate: Gate::default() }
+    } else {
+        Renewal::AtEnd
+    };
+    let start = Instant::now();
+    let engine = Engine::new(mesh, RefineParams::robust(tip), Some(params), renewal);
+    let mut engine = engine.expect("the settings are in range");
+    let build_ms = start.elapsed().as_secs_f64() * 1e3;
+    let (mut times, mut ages, mut moved, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
+    for i in 0..seconds * 1000 {
+        let sample = noisy(side, i);
+        if is_live {
+            // a thread that waits busily would slow the other down where both share a core
+            std::thread::sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
+        }
+        let start = Instant::now();
+        engine.push(&sample).expect("the sample is sound");
+        let time = start.elapsed().as_nanos() as u64;
+        if i > 1000 {
+            times.push(time);
+            moved += engine.refiner().moved_vertices().len();
+            ages.extend(engine.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
+        }
+    }
+    times.sort_unstable();
+    ages.sort_unstable();
+    let [median, p99, p999, longest] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile(&times, share));
+    print!(
+        "edge {:6.3} mm {faces:>8} faces: begun in {build_ms:5.0} ms; push median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} \
+         max {longest:8.0}; {:6.1} vertices; {:.0} MB",
+        edge * 1e3,
+        moved as f64 / times.len() as f64,
+        resident(),
+    );
+    if is_live {
+        let ([median, p99], counts) = ([0.5, 0.99].map(|share| percentile(&ages, share)), engine.counts());
+        print!("; patch behind {median:5.1} ms, p99 {p99:6.1}; late {} of {}", counts.late, counts.renewals);
+    }
+    println!();
+}
+
+fn main() {
+    let numbers: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
+    let is_live = std::env::args().any(|word| word == "live");
+    let seconds = numbers.first().copied().unwrap_or(if is_live { 10 } else { 100 });
+    let sizes = if numbers.len() > 1 { numbers[1..].to_vec() } else { vec![10_000, 200_000, 1_000_000, 5_000_000] };
+    for faces in sizes {
+        for share in EDGES {
+            measure(faces, share * RADIUS, seconds, is_live);
+        }
+    }
+}
