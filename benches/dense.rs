@@ -8,51 +8,22 @@
 //!
 //! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
 
+mod sliding;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector3;
+use sliding::{SCAN_NOISE, noisy, percentile, resident};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
-use touchup::sim::wavy::{RADIUS, STIFFNESS, plate, slide_on};
-use touchup::stylus::Sample;
+use touchup::sim::wavy::{RADIUS, STIFFNESS, plate};
 
 /// Edge lengths, in radii of the tip.
 const EDGES: [f64; 6] = [1.0 / 30.0, 0.1, 0.25, 0.5, 1.0, 2.0];
 /// Smallest side of a plate, m: a raster on it turns after three radii.
 const SMALLEST_SIDE: f64 = 5.0 * RADIUS;
-/// Noise of the tracker on each axis, m.
-const NOISE: f64 = 0.03e-3;
-/// Assumed scan noise, m.
-const SCAN_NOISE: f64 = 0.3e-3;
-
-fn percentile(sorted: &[u64], share: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * share).round() as usize] as f64 * 1e-3
-}
-
-/// Evenly spread noise of the wanted standard deviation, the same each time.
-fn noisy(side: f64, i: usize) -> Sample {
-    let mut sample = slide_on(side, i, 0.8 * side);
-    let mut state = i as u64;
-    let mut draw = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
-    };
-    draw();
-    sample.pose_ot.translation.vector += Vector3::new(draw(), draw(), draw());
-    sample
-}
-
-/// Memory of the process, MB.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kilobytes =
-        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
-    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
-}
-
 fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let side = edge * (faces as f64 / 2.0).sqrt();
     if side < SMALLEST_SIDE {
@@ -73,7 +44,7 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
     let (mut times, mut ages, mut moved, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
-        let sample = noisy(side, i);
+        let sample = noisy(side, i, 0.8 * side);
         if is_live {
             // a thread that waits busily would slow the other down where both share a core
             std::thread::sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));

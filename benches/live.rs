@@ -8,50 +8,22 @@
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.
 
+mod sliding;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use nalgebra::Vector3;
+use sliding::{SCAN_NOISE, noisy, percentile, resident};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
-use touchup::sim::wavy::{RADIUS, STEP_NS, STIFFNESS, slide, wavy_plate};
-use touchup::stylus::Sample;
+use touchup::sim::wavy::{RADIUS, SIDE, STEP_NS, STIFFNESS, wavy_plate};
 
 /// Width of the raster, m: passed over each 4.6 minutes.
 const WIDTH: f64 = 40e-3;
-/// Noise of the tracker on each axis, m.
-const NOISE: f64 = 0.03e-3;
-/// Assumed scan noise, m.
-const SCAN_NOISE: f64 = 0.3e-3;
 /// Samples in one line of the table.
 const MINUTE: usize = 60_000;
-
-fn percentile(sorted: &[u64], share: f64) -> f64 {
-    sorted[((sorted.len() - 1) as f64 * share).round() as usize] as f64 * 1e-3
-}
-
-/// Evenly spread noise of the wanted standard deviation, the same each time.
-fn noisy(i: usize) -> Sample {
-    let mut sample = slide(i, WIDTH);
-    let mut state = i as u64;
-    let mut draw = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
-    };
-    draw();
-    sample.pose_ot.translation.vector += Vector3::new(draw(), draw(), draw());
-    sample
-}
-
-/// Memory of the process, MB.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kilobytes =
-        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
-    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
-}
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
@@ -69,7 +41,7 @@ fn main() {
     println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
     let (mut times, mut ages, mut late, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
-        let sample = noisy(i);
+        let sample = noisy(SIDE, i, WIDTH);
         let due = Duration::from_millis(if is_fast { 0 } else { i as u64 });
         // a thread that waits busily would slow the other down where both share a core
         std::thread::sleep(due.saturating_sub(begun.elapsed()));

@@ -15,8 +15,8 @@ use crate::numeric::direction;
 const NONE: u32 = u32::MAX;
 /// Edges of the simplified mesh are longer than the distance between seeds by this, in the mean.
 const EDGE_OF_SPACING: f64 = 1.2;
-/// Share of the largest curvature of a quadric below which a direction is left to the mean of the cell: noise alone tilts planes by
-/// more than this.
+/// Share of the largest curvature of a quadric below which a direction is left to the mean of the cell: planes 8° from a common one do
+/// not say where along it they meet.
 const FLAT: f64 = 0.02;
 
 /// A mesh with few faces in place of one with many.

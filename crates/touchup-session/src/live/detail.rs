@@ -13,7 +13,7 @@ pub(super) struct Detail {
 impl Detail {
     /// What the haptic update is to work on, and the detail that it leaves out; a scan that is coarse enough is taken as it is.
     ///
-    /// - `refine`: told the edges of what it works on.
+    /// - `refine`: the mean edge of its region becomes that of what it works on.
     pub fn of(scan: TriMesh, refine: &mut RefineParams) -> Result<(TriMesh, Option<Self>), MeshError> {
         let Some(edge) = refine.simplified_edge(mean_edge(&scan)) else { return Ok((scan, None)) };
         let simplified = Simplified::new(&scan, edge)?;
