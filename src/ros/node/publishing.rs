@@ -49,7 +49,9 @@ impl RefinementWorker {
         let message = HapticMismatch {
             header: header(tip.stamp_ns, &self.setup.shared.frame),
             contact_case: number_of(update.case),
-            face: found.map_or(HapticMismatch::NO_FACE, |found| found.face.0),
+            face: found
+                .and_then(|found| self.session.engine.shown_face(found.face))
+                .map_or(HapticMismatch::NO_FACE, |face| face.0),
             mesh_version: self.session.version,
             tip: point(&centre),
             actual_force: vector(&actual_force),
@@ -101,7 +103,11 @@ impl RefinementWorker {
         let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
         let sent_edits = mesh.edits();
         let stamp_ns = self.session.last_ns.unwrap_or(0);
-        edits.fill(&mut self.session.engine, &self.setup.scan.0, self.session.version, stamp_ns, is_idle);
+        let (scan, version) = (&self.setup.scan.0, self.session.version);
+        if let Err(error) = edits.fill(&mut self.session.engine, scan, version, stamp_ns, is_idle) {
+            self.fail(&error);
+            return None;
+        }
         if edits.is_empty() && !edits.is_complete {
             self.kept = Some(edits);
             return None;

@@ -336,7 +336,7 @@ impl RefinementWorker {
         }
     }
 
-    fn fail(&mut self, error: &LiveError) {
+    pub(super) fn fail(&mut self, error: &LiveError) {
         warn!(%error, "no samples are taken any more");
         self.fault = Some(error.to_string());
     }

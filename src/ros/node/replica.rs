@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use nalgebra::Point3;
 
 use crate::clock::{Clock, Working};
-use crate::live::Engine;
+use crate::live::{Engine, LiveError};
 use crate::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
 use crate::reconstruct::Support;
 use crate::ros::locked;
@@ -47,14 +47,24 @@ impl Edits {
     /// Fills it with what changed.
     ///
     /// - `may_be_torn`: count as complete what is in the middle of a change of the patch.
-    pub fn fill(&mut self, engine: &mut Engine, scan: &TriMesh, version: u64, stamp_ns: i64, may_be_torn: bool) {
+    ///
+    /// # Errors
+    /// As [`Engine::take_changes`].
+    pub fn fill(
+        &mut self,
+        engine: &mut Engine,
+        scan: &TriMesh,
+        version: u64,
+        stamp_ns: i64,
+        may_be_torn: bool,
+    ) -> Result<(), LiveError> {
         let Self { vertices, faces, tiles, taken, .. } = self;
         vertices.clear();
         faces.clear();
         tiles.clear();
         taken.clear();
-        let is_all = engine.take_changes(AT_ONCE, taken);
-        let mesh = engine.refiner().mesh();
+        let is_all = engine.take_changes(AT_ONCE, taken)?;
+        let mesh = engine.mesh();
         let mut note = |face: FaceId| {
             let tile = face.0 / FACES_OF_A_TILE;
             // neighbours are mostly in one tile: the list stays short
@@ -76,6 +86,7 @@ impl Edits {
         }
         self.is_complete = is_all && (may_be_torn || engine.is_whole());
         (self.version, self.stamp_ns) = (version, stamp_ns);
+        Ok(())
     }
 
     /// Whether nothing has changed.

@@ -1,9 +1,12 @@
 //! Scans much finer than the tip: what a touch costs, and what becomes of the detail.
 
-use nalgebra::{Isometry3, Vector3};
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::haptic::{RefineParams, TipParams};
-use touchup::live::{Engine, Renewal};
-use touchup::mesh::TriMesh;
+use touchup::live::{Engine, Gate, Pace, Renewal};
+use touchup::mesh::{Changes, FaceTree, TriMesh, VertexId};
+use touchup::reconstruct::{PatcherParams, Support};
 use touchup::stylus::{Sample, Wrench};
 
 use crate::common::grid;
@@ -86,4 +89,54 @@ fn the_paper_takes_every_face_as_it_is() {
     let scan = scan();
     let engine = Engine::new(scan.clone(), RefineParams::paper(TIP), None, Renewal::AtEnd).unwrap();
     assert_eq!(engine.refiner().mesh().face_count(), scan.face_count());
+}
+
+/// The largest distance of a vertex that a face uses from another mesh, m, where it is within `TOUCHED` of the middle.
+fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
+    let tree = FaceTree::new(to);
+    let used = (0..from.vertex_slots() as u32).map(VertexId).filter(|&v| !from.star(v).is_empty());
+    let near = used.map(|v| from.position(v)).filter(|p| p.x.abs().max(p.y.abs()) < TOUCHED);
+    let off = |p: Point3<f64>| tree.closest(to, &p, 1.0).map_or(1.0, |hit| hit.distance_squared.sqrt());
+    near.map(off).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_dense_scan_is_shown_with_its_own_faces_and_those_of_the_patch() {
+    let scan = scan();
+    let patch = PatcherParams::new(TIP.radius, TIP.stiffness, 0.1e-3);
+    let pace = Pace { is_patient: true, ..Pace::default() };
+    let shared = Arc::new((scan.clone(), FaceTree::new(&scan)));
+    let renewal = Renewal::Beside { scan: shared, pace, room: 1 << 14, gate: Gate::default() };
+    let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), Some(patch), renewal).unwrap();
+    engine.watch();
+    assert!(engine.mesh().positions() == scan.positions());
+    let mut changes = Changes::default();
+    for (i, sample) in samples().enumerate() {
+        engine.push(&sample).unwrap();
+        if i % 33 == 0 {
+            engine.take_changes(200, &mut changes).unwrap();
+        }
+    }
+    engine.catch_up().unwrap();
+    while !engine.take_changes(200, &mut changes).unwrap() {}
+    let (shown, working) = (engine.mesh(), engine.refiner().mesh());
+    assert!(working.face_count() < scan.face_count() / 5, "{}", working.face_count());
+    // the texture, and how far coarse faces of the scan are off it
+    let [there, back] = [farthest(shown, working), farthest(working, shown)];
+    assert!(there < 3.0 * HEIGHT && back < 3.0 * HEIGHT, "{there} {back}");
+    let mut gone = 0;
+    for (face, corners) in scan.faces() {
+        let from_middle =
+            corners.map(|v| scan.position(v)).iter().map(|p| p.x.abs().max(p.y.abs())).fold(0.0, f64::max);
+        let is_there = shown.has_face(face) && shown.corners(face) == corners;
+        gone += usize::from(!is_there);
+        if from_middle > TOUCHED + TIP.radius + 3e-3 {
+            assert!(is_there && corners.iter().all(|&v| shown.position(v) == scan.position(v)), "{face:?}");
+        }
+    }
+    // a square of 6 mm has 7200 faces of this scan
+    assert!(gone > 5000, "{gone} faces of the scan are hidden");
+    let touched = (0..shown.vertex_slots() as u32).map(VertexId);
+    let touched = touched.filter(|&v| engine.support(&scan, v) == Support::Touched).count();
+    assert!(touched > 100, "{touched} vertices shown as touched");
 }

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
-use super::{MeshError, TriMesh, VertexId, corner_normal, triangle};
+use super::{MeshError, TriMesh, VertexId, triangle};
 use crate::numeric::direction;
 
 /// Cell of a vertex that no face uses.
@@ -88,46 +88,81 @@ impl Simplified {
         self.mesh.bytes() + self.cells.capacity() * size_of::<u32>()
     }
 
+    /// The vertex that stands for a vertex of the original; `None`: no face uses it.
+    pub fn cell_of(&self, vertex: VertexId) -> Option<VertexId> {
+        self.cells.get(vertex.0 as usize).filter(|cell| **cell != NONE).map(|&cell| VertexId(cell))
+    }
+
     /// The original, moved as the simplified mesh was: a vertex keeps its place beside the face that it is nearest to, turned as the
     /// corners of that face are. What is near unmoved faces alone stays, bit by bit.
     ///
     /// - `original`: that it was made of.
-    /// - `moved`: the simplified mesh, with other positions; its faces are the same.
+    /// - `moved`: the simplified mesh, with other positions.
     pub fn carry(&self, original: &TriMesh, moved: &TriMesh) -> TriMesh {
-        let turns = self.turns(moved);
         let mut detailed = original.clone();
+        let turns: Vec<_> = (0..self.mesh.vertex_slots() as u32).map(|at| self.turn(VertexId(at), moved)).collect();
         for (vertex, &cell) in self.cells.iter().enumerate().filter(|(_, cell)| **cell != NONE) {
             let (vertex, here) = (VertexId(vertex as u32), original.positions()[vertex]);
-            if let Some(place) = self.carried(&here, cell, moved, &turns) {
-                detailed.set_position(vertex, place);
-            }
+            let place = self.carried(&here, VertexId(cell), moved, |corner| turns[corner.0 as usize]);
+            place.into_iter().for_each(|place| detailed.set_position(vertex, place));
         }
         detailed
     }
 
-    /// How each vertex of the simplified mesh has turned: from its normal as scanned to that as moved; `None` where it has not moved.
-    fn turns(&self, moved: &TriMesh) -> Vec<Option<UnitQuaternion<f64>>> {
-        let turn = |vertex: u32| {
-            let vertex = VertexId(vertex);
-            if self.mesh.position(vertex) == moved.position(vertex) {
-                return None;
+    /// As [`Self::carry`], for vertices of one cell: `put` takes where each of them is then.
+    ///
+    /// - `moved`: has the vertices of the simplified mesh, and may have other faces.
+    pub fn carry_cell(
+        &self,
+        cell: VertexId,
+        members: impl Iterator<Item = VertexId>,
+        original: &TriMesh,
+        moved: &TriMesh,
+        mut put: impl FnMut(VertexId, Point3<f64>),
+    ) {
+        let mut turns: Vec<(VertexId, Option<UnitQuaternion<f64>>)> = Vec::new();
+        for corner in self.mesh.star(cell).iter().flat_map(|&face| self.mesh.corners(face)) {
+            if !turns.iter().any(|(known, _)| *known == corner) {
+                turns.push((corner, self.turn(corner, moved)));
             }
-            let [before, after] = [&self.mesh, moved].map(|mesh| corner_normal(mesh, vertex));
-            Some(UnitQuaternion::rotation_between(&before, &after).unwrap_or_default())
-        };
-        (0..self.mesh.vertex_slots() as u32).map(turn).collect()
+        }
+        let turn = |corner| turns.iter().find(|(known, _)| *known == corner).and_then(|(_, turn)| *turn);
+        for vertex in members {
+            let here = original.position(vertex);
+            put(vertex, self.carried(&here, cell, moved, turn).unwrap_or(here));
+        }
+    }
+
+    /// How a vertex of the simplified mesh has turned: from its normal as scanned to that as moved; `None` where it has not moved.
+    fn turn(&self, vertex: VertexId, moved: &TriMesh) -> Option<UnitQuaternion<f64>> {
+        if self.mesh.position(vertex) == moved.position(vertex) {
+            return None;
+        }
+        let [before, after] = [&self.mesh, moved].map(|mesh| self.star_normal(vertex, mesh.positions()));
+        Some(UnitQuaternion::rotation_between(&before, &after).unwrap_or_default())
+    }
+
+    /// Sum of the normals of the faces around a vertex, each times its area, m².
+    ///
+    /// - `positions`: of the simplified mesh or of one that was moved, m.
+    fn star_normal(&self, vertex: VertexId, positions: &[Point3<f64>]) -> Vector3<f64> {
+        let doubled = self.mesh.star(vertex).iter().map(|&face| {
+            let [a, b, c] = self.mesh.corners(face).map(|corner| positions[corner.0 as usize]);
+            (b - a).cross(&(c - a))
+        });
+        doubled.sum::<Vector3<f64>>() * 0.5
     }
 
     /// Where a vertex of the original goes; `None`: it stays.
     fn carried(
         &self,
         here: &Point3<f64>,
-        cell: u32,
+        cell: VertexId,
         moved: &TriMesh,
-        turns: &[Option<UnitQuaternion<f64>>],
+        turn: impl Fn(VertexId) -> Option<UnitQuaternion<f64>>,
     ) -> Option<Point3<f64>> {
-        let star = self.mesh.star(VertexId(cell));
-        let is_moved = |corner: &VertexId| turns[corner.0 as usize].is_some();
+        let star = self.mesh.star(cell);
+        let is_moved = |corner: &VertexId| self.mesh.position(*corner) != moved.position(*corner);
         if !star.iter().flat_map(|&face| self.mesh.corners(face)).any(|corner| is_moved(&corner)) {
             return None;
         }
@@ -142,8 +177,8 @@ impl Simplified {
         }
         let mut place = Vector3::zeros();
         for (corner, share) in corners.into_iter().zip(barycentric) {
-            let (arm, turn) = (here - self.mesh.position(corner), turns[corner.0 as usize].unwrap_or_default());
-            place += (moved.position(corner).coords + turn * arm) * share;
+            let arm = here - self.mesh.position(corner);
+            place += (moved.position(corner).coords + turn(corner).unwrap_or_default() * arm) * share;
         }
         Some(Point3::from(place))
     }

@@ -13,6 +13,7 @@ mod gate;
 mod latency;
 mod probed;
 mod renewals;
+mod shown;
 mod worker;
 
 use std::borrow::Cow;
@@ -27,7 +28,7 @@ pub use probed::TouchDelta;
 use renewals::Renewals;
 pub use renewals::{LiveCounts, Pace};
 use touchup_core::haptic::{Footprint, RefineError, RefineParams, Refiner, Update};
-use touchup_core::mesh::{Changes, FaceTree, TriMesh, VertexId};
+use touchup_core::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, Sample};
 
@@ -101,16 +102,15 @@ impl Engine {
         if patch.is_some() {
             refine.bias = refine.bias.or(refine.gate.map(|_| BiasParams::default()));
         }
-        // a mesh that is shown while it is touched has the ids of the scan
-        let is_shown = matches!(renewal, Renewal::Beside { .. });
-        let (working, detail) =
-            if is_shown { (mesh, None) } else { Detail::of(mesh, &mut refine).map_err(RefineError::from)? };
+        let shared = if let Renewal::Beside { scan, .. } = &renewal { Some(scan) } else { None };
+        let (working, detail) = Detail::of(mesh, shared, &mut refine).map_err(RefineError::from)?;
         let mut refiner = Refiner::new(working, refine)?;
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
             (None, _) => Reconstruction::Without,
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
             (Some(patcher), Renewal::Beside { scan, pace, room, gate }) => {
                 refiner.expect_patch(room)?;
+                let scan = detail.as_ref().map_or(scan, Detail::working_scan);
                 Reconstruction::Beside(Box::new(Renewals::new(scan, patcher, pace, gate)?))
             }
         };
@@ -159,6 +159,8 @@ impl Engine {
     /// Whether the mesh is what a file of all samples so far shows.
     pub fn is_settled(&self) -> bool {
         match &self.patch {
+            // the live patch is one of the simplified scan
+            Reconstruction::Beside(_) if self.detail.is_some() => false,
             Reconstruction::Without => true,
             Reconstruction::AtEnd(_) => false,
             Reconstruction::Beside(renewals) => renewals.is_settled(),
@@ -240,11 +242,30 @@ impl Engine {
     /// From here on notes what changes in the mesh, for [`Self::take_changes`].
     pub fn watch(&mut self) {
         self.refiner.watch();
+        self.detail.iter_mut().for_each(Detail::watch);
     }
 
-    /// Changes of the mesh since the last call, as [`TriMesh::take_changes`].
-    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
-        self.refiner.take_changes(most, into)
+    /// Changes of [`Self::mesh`] since the last call, as [`TriMesh::take_changes`]. Where the haptic update works on a simplified scan,
+    /// the mesh follows it by this.
+    ///
+    /// # Errors
+    /// [`LiveError::Refine`] where memory is short.
+    pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> Result<bool, LiveError> {
+        match &mut self.detail {
+            None => Ok(self.refiner.take_changes(most, into)),
+            Some(detail) => Ok(detail.take_changes(&mut self.refiner, most, into).map_err(RefineError::from)?),
+        }
+    }
+
+    /// The mesh to look at: that of the haptic update, and where this works on a simplified scan and [`Self::watch`] was called, the scan
+    /// itself as far as it has followed.
+    pub fn mesh(&self) -> &TriMesh {
+        self.detail.as_ref().and_then(Detail::shown).unwrap_or_else(|| self.refiner.mesh())
+    }
+
+    /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown yet.
+    pub fn shown_face(&self, face: FaceId) -> Option<FaceId> {
+        self.detail.as_ref().map_or(Some(face), |detail| detail.face(face))
     }
 
     /// The haptic update, with the current mesh.
@@ -264,9 +285,14 @@ impl Engine {
     pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
         let is_moved = || {
             let was = scan.positions().get(vertex.0 as usize);
-            was.is_none_or(|was| *was != self.refiner.mesh().position(vertex))
+            was.is_none_or(|was| *was != self.mesh().position(vertex))
         };
-        match self.refiner.support(vertex) {
+        let support = match &self.detail {
+            None => self.refiner.support(vertex),
+            Some(_) if matches!(self.patch, Reconstruction::Without) => None,
+            Some(detail) => Some(detail.support(&self.refiner, vertex).unwrap_or_default()),
+        };
+        match support {
             None if is_moved() => Support::Touched,
             Some(Support::Scan) if is_moved() => Support::Guessed,
             support => support.unwrap_or(Support::Scan),
