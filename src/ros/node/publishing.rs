@@ -95,13 +95,12 @@ impl RefinementWorker {
 
     /// The next changes, when one of those that go round is here and anything has changed.
     fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
-        let mesh = self.session.engine.refiner().mesh();
-        let is_sent = self.session.sent_version == self.session.version && self.session.sent_edits == mesh.edits();
+        let edits_now = self.session.engine.edits();
+        let is_sent = self.session.sent_version == self.session.version && self.session.sent_edits == edits_now;
         if is_sent {
             return None;
         }
         let mut edits = self.kept.take().or_else(|| self.spare.try_recv().ok())?;
-        let sent_edits = mesh.edits();
         let stamp_ns = self.session.last_ns.unwrap_or(0);
         let (scan, version) = (&self.setup.scan.0, self.session.version);
         if let Err(error) = edits.fill(&mut self.session.engine, scan, version, stamp_ns, is_idle) {
@@ -113,7 +112,7 @@ impl RefinementWorker {
             return None;
         }
         if edits.is_complete {
-            (self.session.sent_version, self.session.sent_edits) = (self.session.version, sent_edits);
+            (self.session.sent_version, self.session.sent_edits) = (self.session.version, edits_now);
         }
         Some(edits)
     }

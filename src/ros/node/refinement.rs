@@ -343,7 +343,7 @@ impl RefinementWorker {
 
     /// Another state of the mesh has another version; touches that are new go to the features.
     fn note_changes(&mut self) {
-        let edits = self.session.engine.refiner().mesh().edits();
+        let edits = self.session.engine.edits();
         self.session.version += u64::from(std::mem::replace(&mut self.session.edits, edits) != edits);
         if let Some(changes) = self.session.engine.take_probed() {
             self.session.probed.extend(changes);

@@ -100,15 +100,69 @@ fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
     near.map(off).fold(0.0, f64::max)
 }
 
-#[test]
-fn a_dense_scan_is_shown_with_its_own_faces_and_those_of_the_patch() {
-    let scan = scan();
+/// An engine with a live patch and a mesh to look at.
+fn watched(scan: &TriMesh) -> Engine {
     let patch = PatcherParams::new(TIP.radius, TIP.stiffness, 0.1e-3);
     let pace = Pace { is_patient: true, ..Pace::default() };
-    let shared = Arc::new((scan.clone(), FaceTree::new(&scan)));
+    let shared = Arc::new((scan.clone(), FaceTree::new(scan)));
     let renewal = Renewal::Beside { scan: shared, pace, room: 1 << 14, gate: Gate::default() };
     let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), Some(patch), renewal).unwrap();
     engine.watch();
+    engine
+}
+
+/// The corners of all faces, as bits, whatever the order of the faces.
+fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
+    let bits = |v: VertexId| mesh.position(v).coords.map(f64::to_bits).into();
+    let mut all: Vec<_> = mesh.faces().map(|(_, corners)| corners.map(bits)).collect();
+    all.iter_mut().for_each(|corners| {
+        let least = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+        corners.rotate_left(least);
+    });
+    all.sort_unstable();
+    all
+}
+
+#[test]
+fn a_dense_scan_at_rest_is_shown_as_it_is_saved() {
+    let scan = scan();
+    let [mut rested, mut other] = [watched(&scan), watched(&scan)];
+    assert!(rested.is_settled(), "nothing was touched");
+    let (mut changes, mut rests) = (Changes::default(), 0);
+    for (i, sample) in samples().enumerate() {
+        rested.push(&sample).unwrap();
+        other.push(&sample).unwrap();
+        if i % 700 != 650 {
+            continue;
+        }
+        assert!(!rested.is_settled());
+        for engine in [&mut rested, &mut other] {
+            engine.catch_up().unwrap();
+            while !engine.take_changes(1 << 20, &mut changes).unwrap() {}
+        }
+        assert!(triangles(rested.mesh()) == triangles(other.mesh()), "sample {i}: the rest before left a trace");
+        while !rested.settle().unwrap() {
+            std::thread::yield_now();
+        }
+        // a part of it, and the rest in small steps, as a view takes it
+        while !rested.take_changes(50, &mut changes).unwrap() {}
+        assert!(rested.is_settled());
+        rests += 1;
+        let mut saved = rested.copy_patcher().unwrap().unwrap().recv().unwrap();
+        saved.flush();
+        let patched = saved.patched(&scan, &FaceTree::new(&scan)).unwrap();
+        assert!(triangles(rested.mesh()) == triangles(&patched.mesh), "sample {i}: not what is saved");
+        let shown = (0..rested.mesh().vertex_slots() as u32).map(VertexId);
+        let shown = shown.filter(|&v| rested.support(&scan, v) == Support::Touched).count();
+        assert_eq!(shown, patched.support.iter().filter(|&&support| support == Support::Touched).count());
+    }
+    assert!(rests > 2, "{rests} rests");
+}
+
+#[test]
+fn a_dense_scan_is_shown_with_its_own_faces_and_those_of_the_patch() {
+    let scan = scan();
+    let mut engine = watched(&scan);
     assert!(engine.mesh().positions() == scan.positions());
     let mut changes = Changes::default();
     for (i, sample) in samples().enumerate() {

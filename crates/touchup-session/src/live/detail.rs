@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use touchup_core::haptic::{RefineParams, Refiner, mean_edge};
 use touchup_core::mesh::{Changes, FaceId, FaceTree, MeshError, Simplified, TriMesh, VertexId};
-use touchup_core::reconstruct::Support;
+use touchup_core::reconstruct::{PatchDelta, Support};
 
 use super::shown::{Scans, Shown};
 
@@ -15,6 +15,7 @@ pub(super) struct Detail {
     simplified: Simplified,
     /// once somebody looks
     shown: Option<Shown>,
+    rests: u64,
 }
 
 /// Where the scan is.
@@ -48,7 +49,7 @@ impl Detail {
             Some(shared) => OriginalScan::Shared(Arc::clone(shared)),
             None => OriginalScan::Own(scan),
         };
-        Ok((working, Some(Self { scan, simplified, shown: None })))
+        Ok((working, Some(Self { scan, simplified, shown: None, rests: 0 })))
     }
 
     fn scans(&self) -> Scans<'_> {
@@ -60,7 +61,7 @@ impl Detail {
         self.simplified.carry(self.scan.mesh(), working)
     }
 
-    /// What the live patch works on.
+    /// What the live patch works on, with the tree over its faces.
     pub fn working_scan(&self) -> Arc<(TriMesh, FaceTree)> {
         let mesh = self.simplified.mesh.clone();
         let tree = FaceTree::new(&mesh);
@@ -82,9 +83,27 @@ impl Detail {
     /// # Errors
     /// [`MeshError::TooMany`].
     pub fn take_changes(&mut self, refiner: &mut Refiner, most: usize, into: &mut Changes) -> Result<bool, MeshError> {
-        let Self { scan, simplified, shown: Some(shown) } = self else { return Ok(true) };
+        let Self { scan, simplified, shown: Some(shown), .. } = self else { return Ok(true) };
         let has_followed = shown.follow(Scans { original: scan.mesh(), simplified }, refiner, most)?;
         Ok(shown.take_changes(most, into) && has_followed)
+    }
+
+    /// The mesh to look at becomes the scan with this patch of all touches so far, as [`Self::take_changes`] goes on.
+    pub fn rest(&mut self, patch: PatchDelta, refiner: &Refiner) {
+        if let Some(shown) = &mut self.shown {
+            shown.rest(patch, refiner.mesh());
+            self.rests += 1;
+        }
+    }
+
+    /// Whether the mesh to look at is, or becomes, what [`Self::rest`] was last called with.
+    pub fn is_resting(&self, refiner: &Refiner) -> bool {
+        self.shown.as_ref().is_some_and(|shown| shown.rests(refiner.mesh()))
+    }
+
+    /// How often [`Self::rest`] was called.
+    pub fn rests(&self) -> u64 {
+        self.rests
     }
 
     /// The support of a vertex of the mesh to look at; `None`: it is one of the scan.

@@ -31,6 +31,7 @@ use touchup_core::haptic::{Footprint, RefineError, RefineParams, Refiner, Update
 use touchup_core::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, Sample};
+use worker::PatchedScans;
 
 /// When the patch of an [`Engine`] is made.
 #[derive(Clone, Debug)]
@@ -110,8 +111,11 @@ impl Engine {
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
             (Some(patcher), Renewal::Beside { scan, pace, room, gate }) => {
                 refiner.expect_patch(room)?;
-                let scan = detail.as_ref().map_or(scan, Detail::working_scan);
-                Reconstruction::Beside(Box::new(Renewals::new(scan, patcher, pace, gate)?))
+                let scans = match &detail {
+                    None => PatchedScans { working: scan, shown: None },
+                    Some(detail) => PatchedScans { working: detail.working_scan(), shown: Some(scan) },
+                };
+                Reconstruction::Beside(Box::new(Renewals::new(scans, patcher, pace, gate)?))
             }
         };
         Ok(Self { refiner, patch, detail })
@@ -144,26 +148,30 @@ impl Engine {
 
     /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit, what [`Patcher::patched`] makes of all
     /// samples so far, as a file of the result shows it. Returns whether it is that. The next sample may come at any time, and what it
-    /// changes is as if nothing had been settled. Never waits; without a patch beside the samples there is nothing to do.
+    /// changes is as if nothing had been settled. Never waits; without a patch beside the samples there is nothing to do. Where the haptic
+    /// update works on a simplified scan, the mesh becomes that by [`Self::take_changes`].
     ///
     /// # Errors
     /// As [`Self::rest`].
     pub fn settle(&mut self) -> Result<bool, LiveError> {
-        if let Reconstruction::Beside(renewals) = &mut self.patch {
-            renewals.settle(&mut self.refiner)
-        } else {
-            Ok(true)
+        let Reconstruction::Beside(renewals) = &mut self.patch else { return Ok(true) };
+        let is_settled = renewals.settle(&mut self.refiner)?;
+        if let (Some(detail), Some(patch)) = (&mut self.detail, renewals.take_at_rest()) {
+            detail.rest(patch, &self.refiner);
         }
+        Ok(is_settled)
     }
 
-    /// Whether the mesh is what a file of all samples so far shows.
+    /// Whether the mesh is what a file of all samples so far shows, or becomes so by [`Self::take_changes`].
     pub fn is_settled(&self) -> bool {
-        match &self.patch {
-            // the live patch is one of the simplified scan
-            Reconstruction::Beside(_) if self.detail.is_some() => false,
-            Reconstruction::Without => true,
-            Reconstruction::AtEnd(_) => false,
-            Reconstruction::Beside(renewals) => renewals.is_settled(),
+        match (&self.patch, &self.detail) {
+            (Reconstruction::Without, _) => true,
+            (Reconstruction::AtEnd(_), _) => false,
+            (Reconstruction::Beside(renewals), None) => renewals.is_settled(),
+            (Reconstruction::Beside(renewals), Some(detail)) => {
+                let is_untouched = renewals.counts.renewals == 0;
+                renewals.is_settled() && (is_untouched || detail.is_resting(&self.refiner))
+            }
         }
     }
 
@@ -261,6 +269,11 @@ impl Engine {
     /// itself as far as it has followed.
     pub fn mesh(&self) -> &TriMesh {
         self.detail.as_ref().and_then(Detail::shown).unwrap_or_else(|| self.refiner.mesh())
+    }
+
+    /// How often [`Self::mesh`] was changed since [`Self::watch`], at least: it grows with each change to be taken.
+    pub fn edits(&self) -> u64 {
+        self.refiner.mesh().edits() + self.detail.as_ref().map_or(0, Detail::rests)
     }
 
     /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown yet.

@@ -1,15 +1,13 @@
 //! A patch that is renewed beside the samples, and how its changes come into the mesh.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 
 use super::error::LiveError;
 use super::gate::Gate;
 use super::probed::TouchDelta;
-use super::worker::{Question, Worker, WorkerAnswer};
+use super::worker::{PatchedScans, Question, Worker, WorkerAnswer};
 use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::{PatchDelta, Patcher};
 use touchup_core::stylus::{ContactSample, SettingError};
 
@@ -74,6 +72,8 @@ pub(super) struct Renewals {
     is_late: bool,
     /// whether the mesh is, or becomes with what is open, what the patch of all samples so far shows at once
     is_settled: bool,
+    /// the patch of all touches on the scan that is shown, where that is another, when it has come
+    at_rest: Option<PatchDelta>,
     /// touches not yet requested
     probed: TouchDelta,
     pub counts: LiveCounts,
@@ -81,10 +81,10 @@ pub(super) struct Renewals {
 
 impl Renewals {
     /// Starts the thread.
-    pub fn new(scan: Arc<(TriMesh, FaceTree)>, patcher: Patcher, pace: Pace, gate: Gate) -> Result<Self, LiveError> {
+    pub fn new(scans: PatchedScans, patcher: Patcher, pace: Pace, gate: Gate) -> Result<Self, LiveError> {
         pace.check()?;
         Ok(Self {
-            worker: Worker::new(scan, patcher, gate)?,
+            worker: Worker::new(scans, patcher, gate)?,
             pace,
             batch: Vec::new(),
             slot: None,
@@ -93,6 +93,7 @@ impl Renewals {
             is_done: true,
             is_late: false,
             is_settled: true,
+            at_rest: None,
             probed: TouchDelta::default(),
             counts: LiveCounts::default(),
         })
@@ -166,6 +167,11 @@ impl Renewals {
         Ok(true)
     }
 
+    /// The patch of all touches on the scan that is shown, once, when it has come and nothing was touched since.
+    pub fn take_at_rest(&mut self) -> Option<PatchDelta> {
+        self.is_settled().then(|| self.at_rest.take())?
+    }
+
     /// Whether the mesh is what the patch of all samples so far shows at once.
     pub fn is_settled(&self) -> bool {
         self.is_settled && self.is_done && self.due_ns.is_empty()
@@ -216,8 +222,9 @@ impl Renewals {
         Ok(has_changed_strokes)
     }
 
-    fn take_up(&mut self, refiner: &mut Refiner, WorkerAnswer { delta, probed, .. }: WorkerAnswer) {
+    fn take_up(&mut self, refiner: &mut Refiner, WorkerAnswer { delta, at_rest, probed, .. }: WorkerAnswer) {
         self.due_ns.pop_front();
+        self.at_rest = at_rest;
         self.delta = delta;
         self.probed.extend(probed);
         self.counts.renewals += 1;

@@ -18,7 +18,8 @@ pub(super) enum Question {
     Renew(Vec<ContactSample>),
     /// take in what is still in the smoothing window, and answer what changed
     Flush,
-    /// answer what changes where all that was touched so far is reconstructed at once, what is in the smoothing window among it
+    /// answer what changes where all that was touched so far is reconstructed at once, what is in the smoothing window among it;
+    /// where there is another scan to show, by what this becomes
     Settle,
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
@@ -29,11 +30,22 @@ pub(super) enum Question {
 /// Answers of the thread.
 pub(super) struct WorkerAnswer {
     pub delta: PatchDelta,
+    /// the patch of all touches on the scan that is shown, where that is another
+    pub at_rest: Option<PatchDelta>,
     pub probed: TouchDelta,
     /// whether there was a stroke to take back, or to do again
     pub has_changed_strokes: bool,
     /// to be filled again
     batch: Vec<ContactSample>,
+}
+
+/// The scans of a patch, each with the tree over its faces.
+#[derive(Debug)]
+pub(super) struct PatchedScans {
+    /// what the mesh that follows begins with
+    pub working: Arc<(TriMesh, FaceTree)>,
+    /// what is shown, where that is another
+    pub shown: Option<Arc<(TriMesh, FaceTree)>>,
 }
 
 /// A patcher on a thread of its own. Each request except for a copy has one answer, in the same order.
@@ -47,13 +59,14 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    pub fn new(scan: Arc<(TriMesh, FaceTree)>, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
+    pub fn new(scans: PatchedScans, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
         let (questions, inbox) = channel::<(Question, Working)>();
         let (to_engine, answers) = channel();
         let gate_of_thread = gate.clone();
         let work = move || {
             let gate = gate_of_thread;
             let mut published = PublishedList::default();
+            let PatchedScans { working: scan, shown } = scans;
             for (question, _working) in inbox {
                 let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
                 let is_renewal = matches!(question, Question::Renew(_));
@@ -76,12 +89,19 @@ impl Worker {
                     Question::Settle => {}
                     Question::ChangeStrokes(change) => has_changed_strokes = change(&mut patcher),
                 }
-                let delta = match settles {
-                    true => patcher.settled(&scan.0, &scan.1),
-                    false => patcher.renewed(&scan.0, &scan.1),
+                let mut at_rest = None;
+                let delta = match &shown {
+                    _ if !settles => patcher.renewed(&scan.0, &scan.1),
+                    None => patcher.settled(&scan.0, &scan.1),
+                    Some(shown) => {
+                        let patch = patcher.patch_of_all(&shown.0, &shown.1);
+                        let nothing = PatchDelta { until_ns: patch.until_ns, ..PatchDelta::default() };
+                        at_rest = Some(patch);
+                        nothing
+                    }
                 };
                 let probed = published.changes(patcher.probed());
-                if to_engine.send(WorkerAnswer { delta, probed, has_changed_strokes, batch }).is_err() {
+                if to_engine.send(WorkerAnswer { delta, at_rest, probed, has_changed_strokes, batch }).is_err() {
                     break;
                 }
                 if is_renewal {

@@ -6,7 +6,7 @@ use crate::mesh::{FaceId, TriMesh};
 use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
-use crate::reconstruct::incremental::remesh::Renewed;
+use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
 use crate::reconstruct::table::CellTable;
 
 /// What changed in the patch.
@@ -90,26 +90,28 @@ impl PublishedPatch {
     }
 
     /// The faces of the scan that were touched.
-    pub fn scan_faces(&self) -> impl Iterator<Item = FaceId> + '_ {
+    fn scan_faces(&self) -> impl Iterator<Item = FaceId> + '_ {
         self.faces.iter().filter_map(|(owner, _)| match owner {
             Owner::Scan(face) => Some(face),
             Owner::Edge(_) | Owner::Square(_) => None,
         })
     }
 
+    /// As [`Self::take`], where everything was renewed.
+    pub fn take_all(&mut self, mut renewed: Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
+        renewed.core = CellBox::ALL;
+        renewed.scanned.extend(self.scan_faces());
+        self.take(&renewed, remesh, scan)
+    }
+
     /// Takes up what was renewed; returns what is another than before.
     ///
-    /// - `support`: of a vertex.
-    pub fn take(
-        &mut self,
-        renewed: &Renewed,
-        region: &LatticeRegion,
-        scan: &TriMesh,
-        support: impl Fn(&VertexKey) -> Support,
-    ) -> PatchDelta {
+    /// - `remesh`: by which it was renewed.
+    pub fn take(&mut self, renewed: &Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
         let next = faces_by_owner(&renewed.patch);
         let mut draft = Draft::default();
-        for owner in self.owners_around(&renewed.core, region).into_iter().filter(|owner| !next.contains(owner)) {
+        for owner in self.owners_around(&renewed.core, &remesh.region).into_iter().filter(|owner| !next.contains(owner))
+        {
             self.replace(owner, Vec::new(), &mut draft);
             self.forget(owner);
         }
@@ -122,7 +124,7 @@ impl PublishedPatch {
         for (owner, faces) in next.iter() {
             self.replace(owner, faces.clone(), &mut draft);
         }
-        self.place(&renewed.patch, scan, &support, &mut draft);
+        self.place(&renewed.patch, scan, remesh, &mut draft);
         for key in draft.left {
             if self.vertices.get(&key).is_some_and(|placed| placed.uses == 0) {
                 self.vertices.remove(&key);
@@ -190,7 +192,7 @@ impl PublishedPatch {
     }
 
     /// Puts the vertices of the draft's faces, and those that moved, where they belong.
-    fn place(&mut self, patch: &Patch, scan: &TriMesh, support: &impl Fn(&VertexKey) -> Support, draft: &mut Draft) {
+    fn place(&mut self, patch: &Patch, scan: &TriMesh, remesh: &Remesh, draft: &mut Draft) {
         let mut is_seen = vec![false; patch.vertices.len()];
         for &vertex in patch.faces.iter().flat_map(|face| &face.corners) {
             if std::mem::replace(&mut is_seen[vertex as usize], true) {
@@ -198,7 +200,7 @@ impl PublishedPatch {
             }
             let (key, position) = patch.vertices.entry(vertex);
             let Some(placed) = self.vertices.get_mut(key) else { continue };
-            let support = support(key);
+            let support = remesh.support(key);
             if placed.position != *position || placed.support != support {
                 (placed.position, placed.support) = (*position, support);
                 draft.at.insert_with(*key, || ());

@@ -9,12 +9,12 @@ use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::outliers::Outliers;
-use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams, NodeState, Source};
+use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams};
 use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
-use crate::reconstruct::field::grid::{GridChanges, ReconstructionGrid, nodes_around_contact, nodes_around_contacts};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
+use crate::reconstruct::field::grid::{GridChanges, nodes_around_contact, nodes_around_contacts};
+use crate::reconstruct::field::lattice::Lattice;
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::uncertainty::vertex_sigma;
 use crate::reconstruct::field::unreachable::mark_unreachable;
@@ -266,16 +266,11 @@ impl Patcher {
         &self.history.contacts.outliers
     }
 
-    /// A copy of the touch history, without the state of a mesh that follows.
+    /// A copy of the touch history, without the state of a mesh that follows: it may go on with another scan of the part.
     pub fn copy(&self) -> Self {
         let Self { params, finder, history, .. } = self;
-        Self {
-            params: *params,
-            finder: finder.clone(),
-            history: history.clone(),
-            live: None,
-            is_closed: self.is_closed,
-        }
+        let history = TouchHistory { bounds: None, ..history.clone() };
+        Self { params: *params, finder: finder.clone(), history, live: None, is_closed: None }
     }
 
     /// The settings.
@@ -357,7 +352,7 @@ impl Patcher {
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
             if let Some(id) = id {
-                support[id.0 as usize] = support_of(&key, &remesh.grid);
+                support[id.0 as usize] = remesh.support(&key);
             }
         }
         if let Some(radius) = self.params.ball() {
@@ -400,17 +395,14 @@ impl Patcher {
         });
         let (changes, late) = live.take_changes();
         let faces = self.whole(scan) + live.published.faces_more();
-        let renewed = if live.is_outdated || faces > self.budget(scan) {
-            let (remesh, mut renewed) = self.remeshed(scan, tree);
+        let delta = if live.is_outdated || faces > self.budget(scan) {
+            let (remesh, renewed) = self.remeshed(scan, tree);
             (live.remesh, live.is_outdated) = (remesh, false);
-            renewed.core = CellBox::ALL;
-            renewed.scanned.extend(live.published.scan_faces());
-            renewed
+            live.published.take_all(renewed, &live.remesh, scan)
         } else {
-            live.remesh.renew(&self.evidence(scan, tree), &changes, &late)
+            let renewed = live.remesh.renew(&self.evidence(scan, tree), &changes, &late);
+            live.published.take(&renewed, &live.remesh, scan)
         };
-        let support = |key: &VertexKey| support_of(key, &live.remesh.grid);
-        let delta = live.published.take(&renewed, &live.remesh.region, scan, support);
         self.live = Some(live);
         PatchDelta { until_ns: self.history.until_ns, ..delta }
     }
@@ -420,19 +412,33 @@ impl Patcher {
     ///
     /// It takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
+        let (remesh, renewed, until_ns) = self.reconstructed(scan, tree);
+        let mut live = self.live.take().unwrap_or_default();
+        (live.remesh, live.is_outdated) = (remesh, false);
+        let delta = live.published.take_all(renewed, &live.remesh, scan);
+        self.live = Some(live);
+        PatchDelta { until_ns, ..delta }
+    }
+
+    /// What [`Self::patched`] makes of all touches so far, those in the smoothing window among them, as a change of the scan. The mesh
+    /// that follows [`Self::renewed`] has no part in it, and may be one of another scan of the part.
+    ///
+    /// It takes the time of a whole reconstruction.
+    ///
+    /// - `scan`: with the tree over its faces.
+    pub fn patch_of_all(&self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
+        let (remesh, renewed, until_ns) = self.reconstructed(scan, tree);
+        PatchDelta { until_ns, ..PublishedPatch::default().take_all(renewed, &remesh, scan) }
+    }
+
+    /// The patch of all touches so far, those in the smoothing window among them, and the stamp of the last, ns.
+    fn reconstructed(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed, i64) {
         let mut all = self.copy();
         all.flush();
         all.history.contacts.note_all();
         all.update(scan, tree);
-        let (remesh, mut renewed) = all.remeshed(scan, tree);
-        let mut live = self.live.take().unwrap_or_default();
-        renewed.core = CellBox::ALL;
-        renewed.scanned.extend(live.published.scan_faces());
-        (live.remesh, live.is_outdated) = (remesh, false);
-        let support = |key: &VertexKey| support_of(key, &live.remesh.grid);
-        let delta = live.published.take(&renewed, &live.remesh.region, scan, support);
-        self.live = Some(live);
-        PatchDelta { until_ns: all.history.until_ns, ..delta }
+        let (remesh, renewed) = all.remeshed(scan, tree);
+        (remesh, renewed, all.history.until_ns)
     }
 
     fn update(&mut self, scan: &TriMesh, tree: &FaceTree) {
@@ -505,17 +511,4 @@ fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
 
 fn lattice_of(pitch: f64) -> Lattice {
     Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
-}
-
-/// A vertex is touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
-fn support_of(key: &VertexKey, grid: &ReconstructionGrid) -> Support {
-    let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
-    let is_touched = |node: &LatticeNode| grid.nodes.get(node).is_some_and(is_of_touch);
-    let touched = match *key {
-        VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
-        VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,
-        VertexKey::Square(square, _) => square.corners().iter().filter(|node| is_touched(node)).count() >= 2,
-        VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
-    };
-    if touched { Support::Touched } else { Support::Guessed }
 }

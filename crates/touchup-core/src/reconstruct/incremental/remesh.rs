@@ -4,11 +4,11 @@ use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
 use crate::reconstruct::contour::crossing::Crossings;
 use crate::reconstruct::contour::dual_contouring::contour_in;
-use crate::reconstruct::contour::patched::Patch;
+use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::contour::scan_clipping::{Cut, cells_around, faces_near};
-use crate::reconstruct::evidence::point_evidence::Evidence;
+use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::grid::{Changed, GridChanges, ReconstructionGrid, cells_of};
-use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::table::CellTable;
 
 /// Rounds in which the region grows over squares where scan and patch cannot be joined.
@@ -63,6 +63,19 @@ impl Remesh {
         }
         self.take_up(&changed, &mut core, &mut left);
         self.grow(evidence, core, &left)
+    }
+
+    /// The support of a vertex: touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
+    pub fn support(&self, key: &VertexKey) -> Support {
+        let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
+        let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
+        let touched = match *key {
+            VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
+            VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,
+            VertexKey::Square(square, _) => square.corners().iter().filter(|node| is_touched(node)).count() >= 2,
+            VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
+        };
+        if touched { Support::Touched } else { Support::Guessed }
     }
 
     /// Takes cells into the region, or out of it, as the field has changed.

@@ -1,8 +1,13 @@
 //! The mesh that is shown where haptic update and patch work on a simplified scan: the faces of the scan where nothing was replaced,
-//! moved along with the simplified ones, and the faces of the patch.
+//! moved along with the simplified ones, and the faces of the patch. At rest it is the scan with the patch of all touches.
 
-use std::collections::HashMap;
+mod at_rest;
+mod groups;
 
+use std::collections::{HashMap, HashSet};
+
+use at_rest::AtRest;
+use groups::Groups;
 use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle};
 use touchup_core::reconstruct::Support;
@@ -41,8 +46,11 @@ pub(super) struct Shown {
     working: HashMap<VertexId, VertexId>,
     /// removed from the working mesh, while faces that are to follow still use them
     leaving: Vec<VertexId>,
-    /// cells whose vertices are to be moved
+    /// cells whose vertices are to be moved …
     moving: IdSet,
+    /// … and those whose vertices are not all where the scan has them
+    moved: HashSet<u32>,
+    at_rest: AtRest,
     changes: Changes,
 }
 
@@ -51,34 +59,6 @@ pub(super) struct Shown {
 pub(super) struct Scans<'a> {
     pub original: &'a TriMesh,
     pub simplified: &'a Simplified,
-}
-
-/// Ids by group, those of one after another.
-#[derive(Debug)]
-struct Groups {
-    starts: Vec<u32>,
-    ids: Vec<u32>,
-}
-
-impl Groups {
-    /// - `group_of`: of each id below `count`, if it has one.
-    fn new(groups: usize, count: usize, group_of: impl Fn(u32) -> Option<u32>) -> Self {
-        let mut starts = vec![0u32; groups + 1];
-        (0..count as u32).filter_map(&group_of).for_each(|group| starts[group as usize + 1] += 1);
-        (0..groups).for_each(|group| starts[group + 1] += starts[group]);
-        let (mut next, mut ids) = (starts.clone(), vec![0; starts[groups] as usize]);
-        for id in 0..count as u32 {
-            if let Some(group) = group_of(id) {
-                ids[next[group as usize] as usize] = id;
-                next[group as usize] += 1;
-            }
-        }
-        Self { starts, ids }
-    }
-
-    fn of(&self, group: u32) -> &[u32] {
-        &self.ids[self.starts[group as usize] as usize..self.starts[group as usize + 1] as usize]
-    }
 }
 
 impl Shown {
@@ -103,6 +83,8 @@ impl Shown {
             working: HashMap::new(),
             leaving: Vec::new(),
             moving: IdSet::default(),
+            moved: HashSet::new(),
+            at_rest: AtRest::default(),
             changes: Changes::default(),
             mesh,
         }
@@ -113,11 +95,23 @@ impl Shown {
         &self.mesh
     }
 
-    /// Takes up to `most` changes of each kind of the working mesh over; returns whether that was all.
+    /// Takes up to `most` changes of each kind of the working mesh over, or where it rests of the patch of all touches; returns whether
+    /// that was all.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
     pub fn follow(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
+        if !self.go_on_resting(scans, refiner.mesh(), most)? {
+            return Ok(false);
+        }
+        if self.at_rest.is_there() {
+            return Ok(true);
+        }
+        let has_followed = self.follow_working(scans, refiner, most)?;
+        Ok(has_followed && !self.begin_to_rest(scans, refiner.mesh()))
+    }
+
+    fn follow_working(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
         let mut changes = std::mem::take(&mut self.changes);
         changes.clear();
         let is_all = refiner.take_changes(most, &mut changes);
@@ -141,9 +135,9 @@ impl Shown {
         self.mesh.take_changes(most, into)
     }
 
-    /// The support of a vertex of the patch, by the working mesh; `None`: it is one of the scan.
+    /// The support of a vertex of the patch, by what it follows; `None`: it is one of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
-        self.working.get(&vertex).and_then(|&working| refiner.support(working))
+        self.at_rest.support(vertex).or_else(|| refiner.support(*self.working.get(&vertex)?))
     }
 
     /// A face that shows a face of the working mesh.
@@ -239,18 +233,14 @@ impl Shown {
     fn hide(&mut self, scans: Scans<'_>, detail: FaceId) {
         self.part(scans, detail);
         for &face in &self.parts[detail.0 as usize] {
-            let current = self.returned.remove(&face).unwrap_or(face);
-            self.mesh.remove_face(current);
+            remove_from(&mut self.mesh, &mut self.returned, face);
         }
     }
 
     fn bring_back(&mut self, scans: Scans<'_>, detail: FaceId) -> Result<(), MeshError> {
         self.part(scans, detail);
         for &face in &self.parts[detail.0 as usize] {
-            let current = self.mesh.add_face(scans.original.corners(face))?;
-            if current != face {
-                self.returned.insert(face, current);
-            }
+            return_to(&mut self.mesh, &mut self.returned, scans.original, face)?;
         }
         Ok(())
     }
@@ -284,6 +274,7 @@ impl Shown {
             self.moving.take(1, |id| cell = id);
             let vertices = self.vertices.of(cell);
             left = left.saturating_sub(vertices.len().max(1));
+            self.moved.insert(cell);
             let mesh = &mut self.mesh;
             let members = vertices.iter().map(|&vertex| VertexId(vertex));
             scans.simplified.carry_cell(VertexId(cell), members, scans.original, working, |vertex, place| {
@@ -293,6 +284,25 @@ impl Shown {
             });
         }
     }
+}
+
+/// Removes a face of the scan from the shown mesh.
+fn remove_from(mesh: &mut TriMesh, returned: &mut HashMap<FaceId, FaceId>, face: FaceId) {
+    mesh.remove_face(returned.remove(&face).unwrap_or(face));
+}
+
+/// Puts a face of the scan back that was removed.
+fn return_to(
+    mesh: &mut TriMesh,
+    returned: &mut HashMap<FaceId, FaceId>,
+    scan: &TriMesh,
+    face: FaceId,
+) -> Result<(), MeshError> {
+    let current = mesh.add_face(scan.corners(face))?;
+    if current != face {
+        returned.insert(face, current);
+    }
+    Ok(())
 }
 
 /// The face of the simplified scan with these corners, if there is one.

@@ -1,0 +1,239 @@
+//! What is shown while nothing is touched: the scan with the patch of all touches in it, as a file of the result has it.
+
+use std::collections::HashMap;
+
+use touchup_core::mesh::{FaceId, MeshError, TriMesh, VertexId};
+use touchup_core::reconstruct::{Owner, PatchDelta, Support, VertexKey};
+
+use super::{FaceShown, Scans, Shown, VERTICES_OF_A_CHANGE, remove_from, return_to};
+
+/// The patch of all touches, as far as it is shown.
+#[derive(Debug, Default)]
+pub(super) struct AtRest {
+    phase: Phase,
+    /// the patch that is to be shown once the working mesh is followed
+    wanted: Option<PatchDelta>,
+    /// … and the one that is
+    patch: PatchDelta,
+    /// edits of the working mesh when it was left
+    edits: u64,
+    /// what is still to be done, the last first
+    steps: Vec<Step>,
+    /// what to do when the working mesh is followed again
+    back: Vec<Step>,
+    /// vertices of `patch`, in its order
+    placed: Vec<VertexId>,
+    support: HashMap<VertexId, Support>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Phase {
+    /// the working mesh is followed
+    #[default]
+    Following,
+    /// the patch of all touches is shown, or becomes so
+    Resting,
+    /// the working mesh comes back
+    Leaving,
+}
+
+/// Of some vertices or faces at once.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    /// the face of the working mesh goes
+    Park(FaceId),
+    /// … and comes again
+    Follow(FaceId),
+    /// what a face of the simplified scan stands for comes
+    BringBack(FaceId),
+    /// … and goes again
+    Hide(FaceId),
+    /// the vertices of a cell go where the scan has them
+    PutBack(u32),
+    /// … and where the working mesh has them
+    Carry(u32),
+    /// a vertex of the working mesh goes; it comes again with its faces
+    Forget(VertexId),
+    /// the next vertex of the patch comes
+    Place(u32),
+    /// … and goes again
+    Unplace(VertexId),
+    /// a face of the scan goes that the patch replaces
+    Cut(FaceId),
+    /// … and comes again
+    Restore(FaceId),
+    /// a face of the patch comes
+    Fill(u32),
+    /// … and goes again
+    Empty(FaceId),
+}
+
+impl AtRest {
+    /// Whether the patch of all touches is shown, all of it.
+    pub fn is_there(&self) -> bool {
+        self.phase == Phase::Resting && self.steps.is_empty()
+    }
+
+    /// The support of a vertex of the patch of all touches.
+    pub fn support(&self, vertex: VertexId) -> Option<Support> {
+        self.support.get(&vertex).copied()
+    }
+}
+
+impl Shown {
+    /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
+    pub fn rest(&mut self, patch: PatchDelta, working: &TriMesh) {
+        let AtRest { phase, patch: shown, edits, wanted, .. } = &mut self.at_rest;
+        let is_same = shown.vertices == patch.vertices && shown.owners == patch.owners && shown.faces == patch.faces;
+        let is_shown = is_same && *phase == Phase::Resting && *edits == working.edits();
+        *wanted = (!is_shown).then_some(patch);
+    }
+
+    /// Whether the patch of all touches is shown, or about to be, as [`Self::follow`] goes on.
+    pub fn rests(&self, working: &TriMesh) -> bool {
+        let AtRest { phase, wanted, edits, .. } = &self.at_rest;
+        wanted.is_some() || *phase == Phase::Resting && *edits == working.edits()
+    }
+
+    /// Where the patch of all touches is wanted, begins with it; returns whether there is anything to do for it.
+    pub(super) fn begin_to_rest(&mut self, scans: Scans<'_>, working: &TriMesh) -> bool {
+        let Some(patch) = self.at_rest.wanted.take() else { return false };
+        let slots = || (0..self.shown.len() as u32).map(FaceId);
+        let mut is_hidden: Vec<bool> = vec![true; self.parts.len()];
+        for shown in &self.shown {
+            if let FaceShown::Detail(detail) = shown {
+                is_hidden[detail.0 as usize] = false;
+            }
+        }
+        let details = scans.simplified.mesh.faces().map(|(detail, _)| detail);
+        let hidden = details.filter(|detail| is_hidden[detail.0 as usize]);
+        let mut steps: Vec<Step> = Vec::new();
+        steps.extend(slots().filter(|face| matches!(self.shown[face.0 as usize], FaceShown::Same(_))).map(Step::Park));
+        steps.extend(hidden.map(Step::BringBack));
+        // in an order that does not hang on the table
+        let mut moved: Vec<u32> = self.moved.iter().copied().collect();
+        moved.sort_unstable();
+        steps.extend(moved.into_iter().map(Step::PutBack));
+        let added = (0..self.added.len() as u32).filter(|&at| self.added[at as usize].is_some());
+        steps.extend(added.map(|at| Step::Forget(VertexId(at))));
+        steps.extend((0..patch.vertices.len() as u32).map(Step::Place));
+        steps.extend(patch.owners.iter().filter_map(|(owner, _)| match owner {
+            Owner::Scan(face) => Some(Step::Cut(*face)),
+            Owner::Edge(_) | Owner::Square(_) => None,
+        }));
+        steps.extend((0..patch.faces.len() as u32).map(Step::Fill));
+        steps.reverse();
+        let at_rest = &mut self.at_rest;
+        (at_rest.phase, at_rest.steps, at_rest.edits) = (Phase::Resting, steps, working.edits());
+        at_rest.patch = patch;
+        at_rest.placed.clear();
+        true
+    }
+
+    /// Goes on from the working mesh to the patch of all touches or back, by up to `most` steps; returns whether that was all.
+    pub(super) fn go_on_resting(
+        &mut self,
+        scans: Scans<'_>,
+        working: &TriMesh,
+        most: usize,
+    ) -> Result<bool, MeshError> {
+        let mut left = most;
+        while left > 0 {
+            let Some(step) = self.at_rest.steps.pop() else {
+                let at_rest = &mut self.at_rest;
+                let has_changed = working.edits() != at_rest.edits || at_rest.wanted.is_some();
+                at_rest.phase = match at_rest.phase {
+                    Phase::Resting if has_changed => {
+                        at_rest.steps = std::mem::take(&mut at_rest.back);
+                        Phase::Leaving
+                    }
+                    Phase::Leaving => {
+                        (at_rest.patch, at_rest.placed) = Default::default();
+                        Phase::Following
+                    }
+                    phase => return Ok(phase != Phase::Leaving),
+                };
+                continue;
+            };
+            left = left.saturating_sub(match step {
+                Step::BringBack(detail) | Step::Hide(detail) => self.parts[detail.0 as usize].len().max(1),
+                Step::PutBack(cell) => self.vertices.of(cell).len().div_ceil(VERTICES_OF_A_CHANGE).max(1),
+                _ => 1,
+            });
+            self.take_step(step, scans, working)?;
+        }
+        Ok(false)
+    }
+
+    /// Takes a step, and notes the one that takes it back.
+    fn take_step(&mut self, step: Step, scans: Scans<'_>, working: &TriMesh) -> Result<(), MeshError> {
+        let back = match step {
+            Step::Park(face) => {
+                let shown = std::mem::replace(&mut self.shown[face.0 as usize], FaceShown::Gone);
+                if let FaceShown::Same(same) = shown {
+                    self.mesh.remove_face(same);
+                }
+                Step::Follow(face)
+            }
+            Step::BringBack(detail) => {
+                self.bring_back(scans, detail)?;
+                Step::Hide(detail)
+            }
+            Step::PutBack(cell) => {
+                for &vertex in self.vertices.of(cell) {
+                    let (vertex, place) = (VertexId(vertex), scans.original.position(VertexId(vertex)));
+                    if self.mesh.position(vertex) != place {
+                        self.mesh.set_position(vertex, place);
+                    }
+                }
+                self.moved.remove(&cell);
+                Step::Carry(cell)
+            }
+            Step::Forget(vertex) => {
+                self.remove(vertex);
+                return Ok(());
+            }
+            Step::Place(at) => {
+                let vertex = self.at_rest.patch.vertices[at as usize];
+                if let VertexKey::Scan(vertex) = vertex.key {
+                    self.at_rest.placed.push(vertex);
+                    return Ok(());
+                }
+                let placed = self.mesh.add_vertex(vertex.position)?;
+                self.at_rest.placed.push(placed);
+                self.at_rest.support.insert(placed, vertex.support);
+                Step::Unplace(placed)
+            }
+            Step::Cut(face) => {
+                remove_from(&mut self.mesh, &mut self.returned, face);
+                Step::Restore(face)
+            }
+            Step::Fill(face) => {
+                let AtRest { patch, placed, .. } = &self.at_rest;
+                let corners = patch.faces[face as usize].map(|corner| placed[corner as usize]);
+                Step::Empty(self.mesh.add_face(corners)?)
+            }
+            Step::Follow(face) => return self.follow_face(scans, working, face),
+            Step::Hide(detail) => {
+                self.hide(scans, detail);
+                return Ok(());
+            }
+            Step::Carry(cell) => {
+                self.moving.insert(cell);
+                return Ok(());
+            }
+            Step::Unplace(vertex) => {
+                self.mesh.remove_vertex(vertex);
+                self.at_rest.support.remove(&vertex);
+                return Ok(());
+            }
+            Step::Restore(face) => return return_to(&mut self.mesh, &mut self.returned, scans.original, face),
+            Step::Empty(face) => {
+                self.mesh.remove_face(face);
+                return Ok(());
+            }
+        };
+        self.at_rest.back.push(back);
+        Ok(())
+    }
+}
