@@ -40,6 +40,8 @@ impl Pairs {
 
     /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m) and that `is_wanted`,
     /// unless they share an edge: neighbours fold, they do not pierce.
+    ///
+    /// - `is_smooth`: whether two faces in a fan around this vertex cannot meet.
     pub fn add_near(
         &mut self,
         mesh: &TriMesh,
@@ -47,6 +49,7 @@ impl Pairs {
         others: &[(FaceId, Corners)],
         margin: f64,
         is_wanted: impl Fn(FaceId) -> bool,
+        is_smooth: impl Fn(VertexId) -> bool,
     ) {
         let (here, corners) = (bounds(&mesh.triangle(face)), mesh.corners(face));
         for &(other, there) in others {
@@ -59,7 +62,8 @@ impl Pairs {
                 Some([i as u8, at as u8])
             });
             let common = shared.next();
-            if shared.next().is_none() {
+            let is_in_fan = common.is_some_and(|[at, _]| is_smooth(corners[at as usize]));
+            if shared.next().is_none() && !is_in_fan {
                 self.list.push(FacePair { faces: [face, other], common, safe_until: 0.0 });
             }
         }
@@ -124,6 +128,11 @@ fn meet(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f6
     let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else { return triangle::intersect(t, u, gap) };
     triangle::segment_crosses(&t[(i + 1) % 3], &t[(i + 2) % 3], u, 0.0)
         || triangle::segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
+}
+
+/// Whether two faces with a common corner, at these places in each, meet beside it.
+pub(super) fn meet_at_corner([t, u]: &[TrianglePoints; 2], common: [u8; 2], gap: f64) -> bool {
+    meet(t, u, Some(common), gap)
 }
 
 /// How far every vertex may move before two faces can meet, m; 0 when there is no simple bound.

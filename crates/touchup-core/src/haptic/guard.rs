@@ -5,6 +5,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::collision::{Corners, Pairs, bounds};
+use super::fans::Fans;
 use super::ring::Ring;
 use super::scratch_map::ScratchMap;
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
@@ -109,8 +110,9 @@ pub(super) struct Neighbourhood {
     before: Vec<FaceShape>,
     /// state after the update, for the moving ones
     after: Vec<FaceShape>,
-    /// mean normal of a smooth region; without one, the pairs in `suspects` are looked at
+    /// mean normal of a smooth region; without one, the fans and the pairs in `suspects` are looked at
     smooth: Option<Vector3<f64>>,
+    fans: Fans,
     suspects: Pairs,
     /// how far vertices may still move before `suspects` or `smooth` must be found again, m
     allowance: f64,
@@ -143,6 +145,7 @@ impl Neighbourhood {
         self.ring.reserve(vertices);
         self.near = BoxQuery::with_room(2 * faces);
         self.boxes.reserve(2 * faces);
+        self.fans.reserve(faces);
         self.suspects.reserve(faces);
         self.reached.reserve(4 * faces);
     }
@@ -179,10 +182,13 @@ impl Neighbourhood {
         self.suspects.clear();
         self.boxes.clear();
         self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
+        let before = &self.before;
+        self.fans.find(mesh, &self.ring, SMOOTH_COSINE, |number| before[number as usize].normal);
         for (moving, &face) in self.ring.moving().iter().enumerate() {
             // two moving faces are one pair
             let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
-            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted);
+            let is_smooth = |corner| self.fans.is_smooth(corner);
+            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted, is_smooth);
         }
     }
 
@@ -256,9 +262,23 @@ impl Neighbourhood {
         match self.smooth.map(|mean| self.stays_smooth(&mean, is_safe)) {
             Some(true) => GuardVerdict::Sound,
             Some(false) => GuardVerdict::Rough,
-            None if self.suspects.are_clear(mesh, evidence.gap, displacement, before) => GuardVerdict::Sound,
+            None if self.are_apart(mesh, evidence.gap, displacement, before) => GuardVerdict::Sound,
             None => GuardVerdict::Broken,
         }
+    }
+
+    /// Whether no faces have come to meet.
+    fn are_apart(
+        &mut self,
+        mesh: &TriMesh,
+        gap: f64,
+        displacement: f64,
+        before: impl Fn(VertexId) -> Point3<f64>,
+    ) -> bool {
+        let after = &self.after;
+        let normal = |number: u32| after[number as usize].normal;
+        self.fans.are_clear(mesh, STILL_SMOOTH_COSINE, normal, gap, &before)
+            && self.suspects.are_clear(mesh, gap, displacement, &before)
     }
 
     /// Whether a region that was smooth is still; sets how far its vertices may move without a look, where all of it `is_safe`.

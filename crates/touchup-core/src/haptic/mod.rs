@@ -7,6 +7,7 @@ mod carve;
 mod collision;
 mod deform;
 pub mod dynamics;
+mod fans;
 mod followed;
 mod guard;
 mod params;
