@@ -69,7 +69,7 @@ fn nothing() -> TriMesh {
 /// The zero set of a field in a region, without a scan.
 fn surface(lattice: &Lattice, region: &LatticeRegion, field: Field) -> TriMesh {
     let scan = nothing();
-    patch_of(lattice, region, &scan, &FaceTree::new(&scan), field).applied_to(&scan).unwrap().0
+    patch_of(lattice, region, &scan, &FaceTree::new(&scan), field).applied_to(scan.clone()).unwrap().0
 }
 
 /// Closed, two-sided, without intersections, and of the given Euler characteristic.
@@ -232,7 +232,7 @@ fn area(mesh: &TriMesh) -> f64 {
 /// The spliced mesh against the scan: one skin with the same rims, nothing else touched. Where squares stayed open, rims are
 /// there and nowhere else.
 fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
-    let mesh = patch.applied_to(scan).unwrap().0;
+    let mesh = patch.applied_to(scan.clone()).unwrap().0;
     let (before, after) = (soundness(scan), soundness(&mesh));
     let new = new_faces(scan, &mesh);
     assert_eq!(after.bad_edges, before.bad_edges);
@@ -505,7 +505,7 @@ fn random_crossings_give_a_closed_skin_without_intersections() {
             point[edge.axis as usize] += within(&mut rng, 0.0, PITCH);
             Crossing { point, normal: Vector3::from_fn(|_, _| within(&mut rng, -1.0, 1.0)).normalize() }
         });
-        let mesh = patch.applied_to(&scan).unwrap().0;
+        let mesh = patch.applied_to(scan.clone()).unwrap().0;
         let sound = soundness(&mesh);
         assert_eq!((sound.rims.len(), sound.bad_edges, sound.bad_vertices), (0, 0, 0), "seed {seed}");
         assert!(intersections(&mesh, PITCH, |_| true).is_empty(), "seed {seed}");

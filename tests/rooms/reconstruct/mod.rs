@@ -5,6 +5,7 @@ mod cost;
 mod double_contact;
 mod fill;
 mod free_space;
+mod kept_detail;
 mod region;
 mod tips;
 mod uncertainty;

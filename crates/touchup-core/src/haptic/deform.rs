@@ -19,8 +19,6 @@ const MARGIN_EDGES: f64 = 0.2;
 /// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by less while it stays on a
 /// face.
 const BOX_MARGIN_EDGES: f64 = 0.05;
-/// Faces looked at to find the mean edge.
-const EDGE_SAMPLE: usize = 20_000;
 
 /// How an update ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +82,7 @@ impl DeformableMesh {
         for (face, _) in mesh.faces() {
             evidence[face.0 as usize] = mesh.normal(face).cast::<f32>().into();
         }
-        let mean_edge = touched.map_or_else(|| mean_edge(&mesh), |touched| touched.mean_edge);
+        let mean_edge = touched.map_or_else(|| mesh.mean_edge(), |touched| touched.mean_edge);
         Self {
             scanned: mesh.positions().to_vec(),
             evidence,
@@ -325,16 +323,4 @@ impl DeformableMesh {
             self.mesh.set_position(vertex, self.before[i] + self.displacements[i] * share);
         }
     }
-}
-
-/// Mean edge length, m, of up to 20,000 faces spread over the mesh.
-pub fn mean_edge(mesh: &TriMesh) -> f64 {
-    let step = (mesh.face_count() / EDGE_SAMPLE).max(1);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (face, _) in mesh.faces().step_by(step) {
-        let [a, b, c] = mesh.triangle(face);
-        sum += (b - a).norm() + (c - b).norm() + (a - c).norm();
-        count += 3.0;
-    }
-    if count > 0.0 { sum / count } else { 0.0 }
 }

@@ -20,7 +20,7 @@ mod stroke_undo;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
-pub use deform::{Footprint, RegionFit, mean_edge};
+pub use deform::{Footprint, RegionFit};
 pub use dynamics::{
     Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
 };

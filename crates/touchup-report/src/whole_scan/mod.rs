@@ -22,7 +22,6 @@ use super::convergence::straight_line;
 use super::error::Measured;
 use super::{Effort, Spread};
 use touchup_core::compare::CompareError;
-use touchup_core::haptic::mean_edge;
 use touchup_core::mesh::TriMesh;
 
 /// One method on one scan.
@@ -253,7 +252,7 @@ fn case(part: &Part, trials: &[Trial]) -> Measured<CaseResult> {
         let before = part.error_of(scan)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
         let methods = own.filter_map(|trial| trial.result(&before)).collect();
-        Ok(ScanResult { edge_mm: mean_edge(scan) * 1e3, faces: scan.face_count(), before, methods })
+        Ok(ScanResult { edge_mm: scan.mean_edge() * 1e3, faces: scan.face_count(), before, methods })
     };
     let gaussian =
         trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use touchup_core::haptic::{RefineParams, Refiner, mean_edge};
+use touchup_core::haptic::{RefineParams, Refiner};
 use touchup_core::mesh::{Changes, FaceId, FaceTree, MeshError, Simplified, TriMesh, VertexId};
 use touchup_core::reconstruct::{PatchDelta, Support};
 
@@ -35,7 +35,7 @@ impl Detail {
         shared: Option<&Arc<(TriMesh, FaceTree)>>,
         refine: &mut RefineParams,
     ) -> Result<(TriMesh, Option<Self>), MeshError> {
-        let Some(edge) = refine.simplified_edge(mean_edge(&scan)) else { return Ok((scan, None)) };
+        let Some(edge) = refine.simplified_edge(scan.mean_edge()) else { return Ok((scan, None)) };
         let simplified = Simplified::new(&scan, edge)?;
         // specks alone: nothing is left of them
         if simplified.mesh.face_count() == 0 {
@@ -43,7 +43,7 @@ impl Detail {
         }
         let working = simplified.mesh.clone();
         if let Some(region) = &mut refine.region {
-            region.mean_edge = mean_edge(&working);
+            region.mean_edge = working.mean_edge();
         }
         let scan = match shared {
             Some(shared) => OriginalScan::Shared(Arc::clone(shared)),

@@ -1,7 +1,7 @@
 //! A scene in which only a region of the scan is ever touched: the rest gets no adjacency and no tree.
 
 use super::{Scene, SceneError};
-use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion, mean_edge};
+use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion};
 use touchup_core::mesh::{Outside, Region, TriMesh};
 use touchup_core::reconstruct::{PatchRegion, PatcherParams};
 use touchup_core::stylus::WrenchFrame;
@@ -46,7 +46,7 @@ impl Scene {
         let Some(region) = self.region() else {
             return Ok(CutScan { mesh: scan, cut: RegionCut::default() });
         };
-        let (mean_edge, faces) = (mean_edge(&scan), scan.face_count());
+        let (mean_edge, faces) = (scan.mean_edge(), scan.face_count());
         let margin = self.margin(mean_edge);
         let (mesh, outside) = scan.cut(&region.grown(margin));
         if mesh.face_count() == 0 {

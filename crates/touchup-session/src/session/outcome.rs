@@ -82,6 +82,8 @@ reported! {
         removed_faces: usize = patched.removed_faces,
         /// faces that came
         added_faces: usize = patched.added_faces,
+        /// vertices of the scan that were moved to where they were touched, with the detail between them
+        moved_vertices: usize = patched.moved_vertices,
         /// share of the new vertices that rest on contacts nearby, not there
         guessed_share: f64 = guessed_share(&patched.support),
         /// time of the reconstruction, s
@@ -157,7 +159,7 @@ impl OutcomePlaces<'_> {
         let (started, wanted) = (Instant::now(), patcher.params().pitch);
         patcher.flush();
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;
-        self.check_changed(patched.removed_faces)?;
+        self.check_changed(patched.removed_faces + patched.moved_vertices)?;
         if patched.pitch > wanted {
             let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
             warn!(
@@ -203,10 +205,14 @@ impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { pitch_mm, guessed_share, .. } = self;
         let [removed, added] = [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
+        let guessed = guessed_share * 100.0;
         write!(
             f,
-            "{removed} of the scan replaced by {added} of {pitch_mm:.2} mm ({:.0} % of their vertices guessed)",
-            guessed_share * 100.0
-        )
+            "{removed} of the scan replaced by {added} of {pitch_mm:.2} mm ({guessed:.0} % of their vertices guessed)"
+        )?;
+        match self.moved_vertices {
+            0 => Ok(()),
+            moved => write!(f, ", {} of the scan moved with its detail", counted(moved, "vertex", "vertices")),
+        }
     }
 }

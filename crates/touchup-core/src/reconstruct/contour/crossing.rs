@@ -195,8 +195,16 @@ mod tests {
         let tip = TipBody::new(TipShape::Ball, RADIUS).unwrap();
         let free_space = FreeSpace::new(tip, 0.1 * RADIUS, 2.0 * RADIUS);
         let (contacts, free_space) = (&contacts, &free_space);
-        let evidence =
-            Evidence { params: &params, contacts, free_space, scan: &scan, tree: &tree, prior: None, is_closed: false };
+        let evidence = Evidence {
+            params: &params,
+            contacts,
+            free_space,
+            scan: &scan,
+            tree: &tree,
+            prior: None,
+            agreement: None,
+            is_closed: false,
+        };
         let mut scratch = FieldScratch::default();
         for (depth, share) in [(0.02e-3, 0.5), (0.05e-3, 0.7), (0.1e-3, 0.9), (0.3e-3, 0.2)] {
             let [a, b] = [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));

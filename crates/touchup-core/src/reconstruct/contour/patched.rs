@@ -20,14 +20,13 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// A copy of the scan with the patch in it, and the id there of each vertex of the patch that a face uses: vertices and
+    /// The scan with the patch in it, and the id there of each vertex of the patch that a face uses: vertices and
     /// untouched faces of the scan keep their ids.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the field's crossings were not
     /// finite.
-    pub fn applied_to(&self, scan: &TriMesh) -> Result<(TriMesh, Vec<Option<VertexId>>), MeshError> {
-        let mut mesh = scan.clone();
+    pub fn applied_to(&self, mut mesh: TriMesh) -> Result<(TriMesh, Vec<Option<VertexId>>), MeshError> {
         for &face in &self.removed {
             mesh.remove_face(face);
         }
@@ -89,6 +88,8 @@ pub struct Patched {
     pub removed_faces: usize,
     /// faces that were added
     pub added_faces: usize,
+    /// vertices of the scan that were moved to where they were touched, with the detail between them
+    pub moved_vertices: usize,
     /// squares on which scan and patch could not be joined
     pub open_squares: usize,
 }
@@ -131,8 +132,16 @@ mod tests {
         let mesh = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         let support = vec![Support::Scan, Support::Touched, Support::Guessed, Support::Unreachable];
         let sigma = vec![0.6e-3, 2e-6, 0.1e-3, 0.25e-3];
-        let mut patched =
-            Patched { mesh, support, sigma, pitch: 1.0, removed_faces: 0, added_faces: 0, open_squares: 0 };
+        let mut patched = Patched {
+            mesh,
+            support,
+            sigma,
+            pitch: 1.0,
+            removed_faces: 0,
+            added_faces: 0,
+            moved_vertices: 0,
+            open_squares: 0,
+        };
         let [touched, number] = [("touched", vec![0.0, 1.0, 0.5, 0.5]), ("support", vec![0.0, 1.0, 2.0, 3.0])];
         let sigma_mm = ("sigma_mm", vec![0.6f32, 2e-3, 0.1, 0.25]);
         assert_eq!(patched.columns(), [touched.clone(), number.clone(), sigma_mm]);

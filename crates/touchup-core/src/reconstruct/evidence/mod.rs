@@ -5,6 +5,7 @@ pub(in crate::reconstruct) mod contact_statistics;
 pub(in crate::reconstruct) mod contact_uncertainty;
 pub(in crate::reconstruct) mod double_contact;
 pub(in crate::reconstruct) mod free_space;
+pub(in crate::reconstruct) mod kept_detail;
 pub(in crate::reconstruct) mod outliers;
 pub(in crate::reconstruct) mod point_evidence;
 pub(in crate::reconstruct) mod probed_log;

@@ -7,6 +7,7 @@ use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
+use crate::reconstruct::evidence::kept_detail::Agreement;
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
@@ -176,6 +177,8 @@ pub(crate) struct Evidence<'a> {
     pub tree: &'a FaceTree,
     /// how well the scan was known before; `None`: where something was touched it does not count
     pub prior: Option<UncertaintyParams>,
+    /// the contacts that the scan agrees with: around them it is the surface, moved to where they are
+    pub agreement: Option<&'a Agreement>,
     /// whether the scan has no rim, so that what is behind it is known: then the patch has none either
     pub is_closed: bool,
 }
@@ -197,6 +200,9 @@ impl Evidence<'_> {
         let (swept_depth, is_free_end) = self.swept_depth(x);
         if swept_depth > 0.0 && source != Source::Touch {
             (value, source) = (scan.value, Source::Nothing);
+        }
+        if source != Source::Far && self.is_detail(touched.as_ref(), scan, swept_depth) {
+            (value, source) = (scan.value, Source::Scan);
         }
         let is_corner = matches!(source, Source::Nothing | Source::Both)
             && touched
@@ -308,6 +314,18 @@ impl Evidence<'_> {
             return (if is_wall { scan.value.max(touched.value) } else { scan.value }, Source::Both);
         }
         if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
+    }
+
+    /// Whether the scan has the shape that was touched here, and in more detail.
+    fn is_detail(&self, touched: Option<&FieldValue>, scan: &ScanDistance, swept_depth: f64) -> bool {
+        let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else { return false };
+        let is_alike =
+            |touched: &FieldValue| !touched.is_fan && !touched.is_edge && touched.gradient.dot(&scan.normal) > ALIKE;
+        let off = touched.map_or(0.0, |touched| scan.value - touched.value);
+        touched.is_none_or(is_alike)
+            && agreement.is_within(off)
+            && (scan.value >= 0.0 || agreement.is_within(swept_depth.max(0.0)))
+            && agreement.holds(self.contacts, &scan.foot)
     }
 
     /// Whether a point out of reach of contacts that is behind the scan is behind the part: a radius nearer to the scan it is in front of a touched
@@ -426,7 +444,8 @@ mod tests {
         let nowhere = free_space();
         let value = |free_space: &FreeSpace, y: f64| {
             let (contacts, scan, tree, params) = (&contacts, &scan, &tree, &params);
-            let evidence = Evidence { params, contacts, free_space, scan, tree, prior: None, is_closed: false };
+            let evidence =
+                Evidence { params, contacts, free_space, scan, tree, prior: None, agreement: None, is_closed: false };
             evidence.touched(&Point3::new(0.0, y, 0.0), None, &mut FieldScratch::default()).unwrap().value
         };
         assert!(value(&nowhere, 0.5 * radius).abs() < 1e-9, "it would go straight on");

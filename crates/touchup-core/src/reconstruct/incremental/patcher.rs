@@ -8,17 +8,18 @@ use crate::reconstruct::contour::patched::{Patch, Patched, Support};
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
+use crate::reconstruct::evidence::kept_detail::{Agreement, KeptDetail};
 use crate::reconstruct::evidence::outliers::Outliers;
 use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams};
 use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
 use crate::reconstruct::field::grid::{GridChanges, nodes_around_contact, nodes_around_contacts};
-use crate::reconstruct::field::lattice::Lattice;
+use crate::reconstruct::field::lattice::{Lattice, VertexKey};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::field::uncertainty::vertex_sigma;
 use crate::reconstruct::field::unreachable::mark_unreachable;
-use crate::reconstruct::incremental::delta::{PatchDelta, PublishedPatch};
+use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex, PublishedPatch};
 use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
 use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape};
@@ -347,11 +348,15 @@ impl Patcher {
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
         self.history.contacts.note_all();
         self.update(scan, tree);
-        let (remesh, Renewed { patch, .. }) = self.remeshed(scan, tree);
-        let (mesh, ids) = patch.applied_to(scan)?;
+        let kept = KeptDetail::of(&self.evidence(scan, tree, None));
+        let (remesh, Renewed { patch, .. }) = self.remeshed_with(scan, tree, kept.as_ref());
+        let (base, moved) = kept.map_or_else(|| (scan.clone(), Vec::new()), |kept| (kept.scan, kept.moved));
+        let (mesh, ids) = patch.applied_to(base)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
+        moved.iter().for_each(|&(vertex, known)| support[vertex.0 as usize] = known);
         for ((key, _), id) in patch.vertices.iter().zip(ids) {
-            if let Some(id) = id {
+            // the scan's own are known
+            if let (Some(id), false) = (id, matches!(key, VertexKey::Scan(_))) {
                 support[id.0 as usize] = remesh.support(&key);
             }
         }
@@ -366,6 +371,7 @@ impl Patcher {
             pitch: remesh.grid.lattice.pitch,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
+            moved_vertices: moved.len(),
             open_squares: patch.open.len(),
         })
     }
@@ -373,7 +379,7 @@ impl Patcher {
     /// Standard deviation of each vertex, where the settings ask for it.
     fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
         let Some(uncertainty) = &self.params.uncertainty else { return Vec::new() };
-        let evidence = Evidence { prior: None, ..self.evidence(scan, tree) };
+        let evidence = Evidence { prior: None, ..self.evidence(scan, tree, None) };
         let (window_ns, mut scratch) = (self.params.window_ns(), FieldScratch::default());
         let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
         mesh.positions().iter().zip(support).map(&mut of).collect()
@@ -400,7 +406,7 @@ impl Patcher {
             (live.remesh, live.is_outdated) = (remesh, false);
             live.published.take_all(renewed, &live.remesh, scan)
         } else {
-            let renewed = live.remesh.renew(&self.evidence(scan, tree), &changes, &late);
+            let renewed = live.remesh.renew(&self.evidence(scan, tree, None), &changes, &late);
             live.published.take(&renewed, &live.remesh, scan)
         };
         self.live = Some(live);
@@ -412,7 +418,8 @@ impl Patcher {
     ///
     /// It takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
-        let (remesh, renewed, until_ns) = self.reconstructed(scan, tree);
+        let all = self.flushed(scan, tree);
+        let ((remesh, renewed), until_ns) = (all.remeshed(scan, tree), all.history.until_ns);
         let mut live = self.live.take().unwrap_or_default();
         (live.remesh, live.is_outdated) = (remesh, false);
         let delta = live.published.take_all(renewed, &live.remesh, scan);
@@ -427,18 +434,26 @@ impl Patcher {
     ///
     /// - `scan`: with the tree over its faces.
     pub fn patch_of_all(&self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
-        let (remesh, renewed, until_ns) = self.reconstructed(scan, tree);
-        PatchDelta { until_ns, ..PublishedPatch::default().take_all(renewed, &remesh, scan) }
+        let all = self.flushed(scan, tree);
+        let kept = KeptDetail::of(&all.evidence(scan, tree, None));
+        let (remesh, renewed) = all.remeshed_with(scan, tree, kept.as_ref());
+        let base = kept.as_ref().map_or(scan, |kept| &kept.scan);
+        let mut delta = PublishedPatch::default().take_all(renewed, &remesh, base);
+        let moved = kept.iter().flat_map(|kept| &kept.moved);
+        delta.vertices.extend(moved.map(|&(vertex, support)| {
+            let key = VertexKey::Scan(vertex);
+            PatchVertex { key, position: base.position(vertex), support }
+        }));
+        PatchDelta { until_ns: all.history.until_ns, ..delta }
     }
 
-    /// The patch of all touches so far, those in the smoothing window among them, and the stamp of the last, ns.
-    fn reconstructed(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed, i64) {
+    /// A copy that has taken in all touches so far, those in the smoothing window among them.
+    fn flushed(&self, scan: &TriMesh, tree: &FaceTree) -> Self {
         let mut all = self.copy();
         all.flush();
         all.history.contacts.note_all();
         all.update(scan, tree);
-        let (remesh, renewed) = all.remeshed(scan, tree);
-        (remesh, renewed, all.history.until_ns)
+        all
     }
 
     fn update(&mut self, scan: &TriMesh, tree: &FaceTree) {
@@ -456,7 +471,7 @@ impl Patcher {
         GridChanges { means, centres }
     }
 
-    fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree) -> Evidence<'a> {
+    fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree, agreement: Option<&'a Agreement>) -> Evidence<'a> {
         let Self { history: TouchHistory { contacts, free_space, .. }, params, .. } = self;
         Evidence {
             params: &params.evidence,
@@ -465,6 +480,7 @@ impl Patcher {
             scan,
             tree,
             prior: params.scan_prior(),
+            agreement,
             is_closed: self.is_closed == Some(true),
         }
     }
@@ -480,7 +496,16 @@ impl Patcher {
 
     /// The patch of everything, within the budget.
     fn remeshed(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
-        let (evidence, changes, budget) = (self.evidence(scan, tree), self.all_changes(), self.budget(scan));
+        self.remeshed_with(scan, tree, None)
+    }
+
+    /// As [`Self::remeshed`], on the scan whose detail is kept, where that is there.
+    fn remeshed_with(&self, scan: &TriMesh, tree: &FaceTree, kept: Option<&KeptDetail>) -> (Remesh, Renewed) {
+        let evidence = match kept {
+            None => self.evidence(scan, tree, None),
+            Some(KeptDetail { scan, tree, agreement, .. }) => self.evidence(scan, tree, Some(agreement)),
+        };
+        let (changes, budget) = (self.all_changes(), self.budget(scan));
         let meshed = |pitch: f64| {
             let mut remesh = Remesh::new(lattice_of(pitch));
             let renewed = remesh.renew(&evidence, &changes, &GridChanges::default());

@@ -54,10 +54,12 @@ enum Step {
     Carry(u32),
     /// a vertex of the working mesh goes; it comes again with its faces
     Forget(VertexId),
-    /// the next vertex of the patch comes
+    /// the next vertex of the patch comes, or one of the scan goes where the patch has it
     Place(u32),
-    /// … and goes again
+    /// … and one that came goes again
     Unplace(VertexId),
+    /// … and one of the scan goes back
+    Return(VertexId),
     /// a face of the scan goes that the patch replaces
     Cut(FaceId),
     /// … and comes again
@@ -148,7 +150,7 @@ impl Shown {
                         Phase::Leaving
                     }
                     Phase::Leaving => {
-                        (at_rest.patch, at_rest.placed) = Default::default();
+                        (at_rest.patch, at_rest.placed, at_rest.support) = Default::default();
                         Phase::Following
                     }
                     phase => return Ok(phase != Phase::Leaving),
@@ -195,8 +197,16 @@ impl Shown {
             }
             Step::Place(at) => {
                 let vertex = self.at_rest.patch.vertices[at as usize];
-                if let VertexKey::Scan(vertex) = vertex.key {
-                    self.at_rest.placed.push(vertex);
+                if let VertexKey::Scan(moved) = vertex.key {
+                    self.at_rest.placed.push(moved);
+                    if vertex.support != Support::Scan {
+                        self.at_rest.support.insert(moved, vertex.support);
+                    }
+                    if self.mesh.position(moved) == vertex.position {
+                        return Ok(());
+                    }
+                    self.mesh.set_position(moved, vertex.position);
+                    self.at_rest.back.push(Step::Return(moved));
                     return Ok(());
                 }
                 let placed = self.mesh.add_vertex(vertex.position)?;
@@ -222,9 +232,12 @@ impl Shown {
                 self.moving.insert(cell);
                 return Ok(());
             }
+            Step::Return(vertex) => {
+                self.mesh.set_position(vertex, scans.original.position(vertex));
+                return Ok(());
+            }
             Step::Unplace(vertex) => {
                 self.mesh.remove_vertex(vertex);
-                self.at_rest.support.remove(&vertex);
                 return Ok(());
             }
             Step::Restore(face) => return return_to(&mut self.mesh, &mut self.returned, scans.original, face),
