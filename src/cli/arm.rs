@@ -164,7 +164,7 @@ pub(super) struct ArmArguments {
 #[derive(Debug, Args)]
 #[group(id = "cell")]
 pub(super) struct CellArguments {
-    /// The scan: PLY, STL or OBJ; not needed when the scene names its file
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
     /// Unit of the coordinates in the scan's file, and in the part's

@@ -30,7 +30,7 @@ const SAMPLES: u32 = 200_000;
 
 #[derive(Debug, Default, Args)]
 pub(super) struct CompareArguments {
-    /// The mesh to be judged: PLY, STL or OBJ; of a refined PLY touched and untouched parts are listed apart
+    /// The mesh to be judged: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; of a refined PLY touched and untouched parts are listed apart
     mesh: PathBuf,
     /// The nominal or true part: PLY, STL or OBJ
     truth: PathBuf,

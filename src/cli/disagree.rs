@@ -19,7 +19,7 @@ use crate::mesh::{FaceTree, TriMesh};
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {
-    /// The scan before refinement: PLY, STL or OBJ
+    /// The scan before refinement: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     scan: PathBuf,
     /// The refined mesh: a PLY of refine, which marks what was touched
     refined: PathBuf,

@@ -20,7 +20,7 @@ use crate::stylus::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
-    /// The scan: PLY, STL or OBJ
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder

@@ -19,7 +19,7 @@ use crate::session::found;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {
-    /// PLY, STL or OBJ
+    /// PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// Unit of the coordinates in its file
@@ -63,7 +63,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
             check_kept("--touches", touches, out)?;
         }
     }
-    let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
+    let MeshFile { mesh, repair, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
     let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
     let (table, file) = match arguments.mode {

@@ -124,7 +124,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         require(TIP_RADII_MM.contains(&given), why)?;
     }
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
-    let MeshFile { mesh: truth, repair } = read_mesh(&arguments.truth, arguments.mesh_unit)?;
+    let MeshFile { mesh: truth, repair, .. } = read_mesh(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
         warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
     }

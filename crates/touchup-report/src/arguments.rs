@@ -83,7 +83,7 @@ pub struct ReportArguments {
     /// Virtual environment for them; made where it is not there [default: peers-env in the folder of --out]
     #[arg(long, value_name = "DIR", requires = "peers")]
     peers_env: Option<PathBuf>,
-    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ
+    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
     scan: Option<PathBuf>,
     /// Its true part, in the frame of the scan

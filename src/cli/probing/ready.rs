@@ -52,7 +52,7 @@ impl Ready {
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(scene))?;
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
-        let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
+        let MeshFile { mesh, repair, .. } = read_mesh(scan, unit)?;
         info!(%repair, "scan");
         let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
         Ok(Self { cell, params, scene, told, mesh, spheres: Vec::new(), check })

@@ -1,9 +1,10 @@
-//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out.
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in, of which a surface is made.
 
 mod column;
 mod defect;
 mod obj;
 mod ply;
+mod point_cloud;
 mod soup;
 mod stl;
 mod text;
@@ -19,6 +20,8 @@ use super::file_error::{FileError, read_file, write_file};
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
+use point_cloud::{Cloud, CloudError, CloudFormat};
+pub use point_cloud::{CloudSummary, NormalSource};
 use soup::Soup;
 use touchup_core::mesh::{FARTHEST, MeshError, RepairReport, TriMesh, is_place, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
@@ -30,7 +33,7 @@ pub enum MeshFileError {
     #[error(transparent)]
     File(#[from] FileError),
     /// Neither the name nor the content is known.
-    #[error("{}: not a kind of mesh file known here: convert it to .ply, .stl or .obj", path.display())]
+    #[error("{}: not a kind of mesh or point cloud known here: convert it to .ply, .stl, .obj, .pcd, .xyz or .e57", path.display())]
     UnknownFormat {
         /// the file
         path: PathBuf,
@@ -52,6 +55,22 @@ pub enum MeshFileError {
         path: PathBuf,
         /// how many points
         vertices: usize,
+    },
+    /// The points make no surface.
+    #[error("{}: {why}", path.display())]
+    Cloud {
+        /// the file
+        path: PathBuf,
+        /// why, and what to do
+        why: String,
+    },
+    /// E57 has a unit, and another one was named.
+    #[error("{}: an E57 file is in metres by its standard, not in {unit}: --mesh-unit m", path.display())]
+    UnitOfE57 {
+        /// the file
+        path: PathBuf,
+        /// the unit named by the user
+        unit: MeshUnit,
     },
     /// The triangles make no mesh.
     #[error("{}: {source}", path.display())]
@@ -86,6 +105,8 @@ pub struct MeshFile {
     pub mesh: TriMesh,
     /// defects of the file
     pub repair: RepairReport,
+    /// how the mesh was made, where the file holds points
+    pub cloud: Option<CloudSummary>,
 }
 
 #[derive(Clone, Copy)]
@@ -116,7 +137,8 @@ impl Format {
     }
 }
 
-/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
+/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]); of a point cloud (PLY without faces, PCD, text, E57) a surface is made, which a
+/// warning says.
 ///
 /// The content decides about the format where it is unmistakable, the extension otherwise.
 ///
@@ -125,18 +147,15 @@ impl Format {
 /// # Errors
 /// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
-    let bytes = read_file(path)?;
-    let format = Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)?;
-    let scale = unit.metres();
-    let soup = match format {
-        _ if bytes.is_empty() => Err(Syntax::ends(FilePlace::Byte(0), "a mesh")),
-        Format::Ply => ply::read(&bytes, scale),
-        Format::Stl => stl::read(&bytes, scale),
-        Format::Obj => obj::read(&bytes, scale),
+    let (soup, cloud) = match Scan::read(path, unit)? {
+        Scan::Triangles(soup) => (soup, None),
+        Scan::Points(cloud) => {
+            let no_surface = |why: CloudError| MeshFileError::Cloud { path: path.into(), why: why.to_string() };
+            let (soup, summary) = point_cloud::surface(cloud).map_err(no_surface)?;
+            (soup, Some(summary))
+        }
     };
-    drop(bytes);
-    let Soup { positions, faces, unused } =
-        soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    let Soup { positions, faces, unused } = soup;
     if faces.is_empty() {
         return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
     }
@@ -145,7 +164,69 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
     report.unused_vertices += unused;
     let [low, high] = mesh.bounds();
     Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
-    Ok(MeshFile { mesh, repair: report })
+    if let Some(summary) = &cloud {
+        tracing::warn!("{}: {summary}", path.display());
+    }
+    Ok(MeshFile { mesh, repair: report, cloud })
+}
+
+/// The points of a point cloud as they are in the file, m, also those without a place; `None` of a mesh.
+///
+/// - `unit`: the unit of the coordinates in the file.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn read_points(path: &Path, unit: MeshUnit) -> Result<Option<Vec<Point3<f64>>>, MeshFileError> {
+    Ok(match Scan::read(path, unit)? {
+        Scan::Triangles(_) => None,
+        Scan::Points(cloud) => Some(cloud.positions),
+    })
+}
+
+/// What a file holds.
+enum Scan {
+    Triangles(Soup),
+    Points(Cloud),
+}
+
+impl Scan {
+    fn read(path: &Path, unit: MeshUnit) -> Result<Self, MeshFileError> {
+        let bytes = read_file(path)?;
+        let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+        if bytes.is_empty() {
+            return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
+        }
+        match cloud_format(&bytes, path) {
+            Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
+                return Err(MeshFileError::UnitOfE57 { path: path.into(), unit });
+            }
+            Some(format) => return Ok(Self::Points(format.read(&bytes, unit).map_err(syntax)?)),
+            None => {}
+        }
+        let scale = unit.metres();
+        let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)? {
+            Format::Stl => stl::read(&bytes, scale),
+            Format::Obj => obj::read(&bytes, scale),
+            Format::Ply => match ply::read(&bytes, scale) {
+                Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
+                    let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
+                    let (positions, normals) = columns.map_err(syntax)?;
+                    return Ok(Self::Points(point_cloud::of_ply(positions, normals)));
+                }
+                soup => soup,
+            },
+        };
+        Ok(Self::Triangles(soup.map_err(syntax)?))
+    }
+}
+
+/// The format of a file that holds nothing but points.
+fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
+    let of_name = || CloudFormat::of_extension(path.extension()?.to_ascii_lowercase().to_str()?);
+    match Format::of_content(bytes) {
+        Some(_) => None,
+        None => CloudFormat::of_content(bytes).or_else(of_name),
+    }
 }
 
 /// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each vertex of the `mesh` that
@@ -169,6 +250,10 @@ pub fn read_vertex_columns<const N: usize>(
     let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
     let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
     let rows = rows_of(mesh, &positions);
+    // of a surface made through points no vertex is in the file
+    if rows.len() < mesh.positions().len() {
+        return Ok([const { None }; N]);
+    }
     Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
 }
 
