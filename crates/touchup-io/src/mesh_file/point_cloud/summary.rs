@@ -45,13 +45,6 @@ pub struct CloudSummary {
     pub cut_faces: usize,
 }
 
-impl CloudSummary {
-    /// Whether cells are this much coarser than the points that detail is lost.
-    fn loses_detail(&self) -> bool {
-        self.resolution_mm > 2.0 * self.spacing_mm
-    }
-}
-
 impl fmt::Display for CloudSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { points, not_finite, duplicates, isolated, reconstruction, faces, .. } = self;
@@ -72,10 +65,6 @@ impl fmt::Display for CloudSummary {
             ", a surface of {faces} faces made through them by {reconstruction}, resolution {:.2} mm, points {:.2} mm apart with {:.2} mm \
              noise, {normals}",
             self.resolution_mm, self.spacing_mm, self.noise_mm
-        )?;
-        if self.loses_detail() {
-            write!(f, "; cut the cloud to the part for a finer one")?;
-        }
-        Ok(())
+        )
     }
 }

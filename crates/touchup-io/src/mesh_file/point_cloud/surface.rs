@@ -1,8 +1,7 @@
-//! A surface through points: Poisson reconstruction [Kazhdan 2006] by the library threecrate, without what it makes where nothing was scanned.
+//! A surface through points: implicit moving least squares [Kolluri 2005] of the points near the nodes of a lattice, meshed by the dual
+//! contouring of the patch. It ends where the points end.
 
 use nalgebra::{Point3, Vector3};
-use threecrate_core::{NormalPoint3f, PointCloud, TriangleMesh};
-use threecrate_reconstruction::{PoissonConfig, poisson_reconstruction};
 
 use super::super::soup::Soup;
 use super::cloud::Cloud;
@@ -10,26 +9,29 @@ use super::normals::{Neighbourhood, oriented};
 use super::parallel;
 use super::summary::CloudSummary;
 use touchup_core::mesh::PointTree;
+use touchup_core::reconstruct::{Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
 
 /// Fewer points make no surface: a plane is laid through as many neighbours, and half of them again are no neighbours.
 const FEWEST: usize = 50;
-/// More would take 16 GiB.
+/// More would take some 10 GB.
 const MOST: usize = 20_000_000;
 /// Points without others within this many spacings are left out, or one stray point would make the cells of all coarse.
 const ISOLATED: f64 = 10.0;
-/// Depths of the grid that the library takes, in powers of 2; each takes eight times the time and memory of the one before.
-const DEPTHS: std::ops::RangeInclusive<u32> = 4..=8;
-/// Cells of at most this many spacings: two to three faces for each point, and none of the detail that the noise leaves is lost.
-const CELL: f64 = 1.5;
-/// Squares on a side of the box of the grid for each point at most: few points in pieces far apart do not take the finest grid.
-const SQUARES: usize = 64;
-/// The box of the grid is larger than that of the points by as much of it on either side, as the library has it.
-const PADDING: f64 = 0.1;
-/// Residual at which the solution is left: at a tenth of it vertices come out within a hundredth of the noise of the same places.
-const TOLERANCE: f64 = 1e-3;
-/// A vertex without a point within this many spacings, or cells where they are larger, is invented.
-const FARTHEST: f64 = 2.0;
-/// Neighbours of a vertex, within this many spacings or cells, whose middle is farther from it than this part of the farthest: it lies
+/// Edge of the cells, in spacings: a cell that the surface passes through has points, and there are two to three faces for each of them.
+const CELL: f64 = 1.3;
+/// Places the planes of the lattice, in cells, where no coordinate that a scanner rounded to falls on them.
+const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
+/// Points whose planes are averaged at a place at most …
+const AVERAGED: u32 = 24;
+/// … weighted by a normal distribution of this many spacings about it, or of this many standard deviations of the noise.
+const WIDTH: (f64, f64) = (1.2, 2.0);
+/// Points farther than this many widths have no weight that matters.
+const FARTHEST_WIDTHS: f64 = 3.0;
+/// Steps in which a crossing is looked for on an edge of the lattice.
+const STEPS: usize = 3;
+/// A vertex without a point within this many spacings is invented.
+const FARTHEST: f64 = 1.8;
+/// Neighbours of a vertex, within this many spacings, whose middle is farther from it than this part of the farthest: it lies
 /// beyond the rim of what was scanned. On the rim of an even surface the middle is 4/(3π) = 0.42 away, at the corner of a cube 0.49.
 const RIM_NEIGHBOURS: (u32, f64, f64) = (64, 3.0, 0.5);
 
@@ -67,19 +69,21 @@ pub(super) fn reconstruct(cloud: Cloud, summary: &mut CloudSummary) -> Result<So
     if kept.len() < FEWEST {
         return Err(CloudError::TooFew { left: kept.len(), points });
     }
+    let pick = |of: &[Vector3<f64>]| kept.iter().map(|&at| of[at]).collect::<Vec<_>>();
     let positions: Vec<_> = kept.iter().map(|&at| cloud.positions[at]).collect();
-    let grid = PoissonGrid::around(&positions, spacing);
-    let oriented_points = kept.iter().map(|&at| grid.point(&cloud.positions[at], &normals[at])).collect();
+    let noise = median(near.iter().map(|near| near.noise).collect());
+    let points = OrientedPoints::new(positions, pick(&normals), spacing, noise);
+    let lattice = Lattice { origin: Point3::from(Vector3::from(ORIGIN) * CELL * spacing), pitch: CELL * spacing };
     summary.isolated = left - kept.len();
     summary.normals = source;
-    summary.reconstruction = "Poisson (threecrate)";
+    summary.reconstruction = "implicit moving least squares";
     summary.spacing_mm = spacing * 1e3;
-    summary.noise_mm = median(near.iter().map(|near| near.noise).collect()) * 1e3;
-    summary.resolution_mm = grid.cell() * 1e3;
+    summary.noise_mm = noise * 1e3;
+    summary.resolution_mm = lattice.pitch * 1e3;
     drop((cloud, near, normals, kept));
-    let mut soup = grid.solve(oriented_points)?;
+    let mut soup = points.contoured(&lattice);
     let made = soup.faces.len();
-    cut_invented(&mut soup, &positions, spacing.max(grid.cell()));
+    cut_invented(&mut soup, &points);
     summary.faces = soup.faces.len();
     summary.cut_faces = made - summary.faces;
     match soup.faces.is_empty() {
@@ -93,61 +97,104 @@ fn median(mut values: Vec<f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The grid on which the library solves, in its own unit: the larger side of the points, so that `f32` is fine enough for any part.
-#[derive(Clone, Copy, Debug)]
-struct PoissonGrid {
-    middle: Point3<f64>,
-    /// m
-    side: f64,
-    depth: u32,
+/// Points with their normals, and the tree over them.
+struct OrientedPoints {
+    positions: Vec<Point3<f64>>,
+    normals: Vec<Vector3<f64>>,
+    tree: PointTree,
+    /// distance of neighbouring points, m
+    spacing: f64,
+    /// standard deviation of the weights about a place, m
+    width: f64,
 }
 
-impl PoissonGrid {
-    /// As coarse as the points allow, if the library can be as fine.
-    fn around(positions: &[Point3<f64>], spacing: f64) -> Self {
-        let [low, high] = positions.iter().fold([positions[0]; 2], |[low, high], p| [low.inf(p), high.sup(p)]);
-        let grid = Self { middle: nalgebra::center(&low, &high), side: (high - low).amax(), depth: *DEPTHS.end() };
-        let is_fine = |depth: &u32| Self { depth: *depth, ..grid }.cell() <= CELL * spacing;
-        let holds_points = |depth: &u32| 1usize << (2 * depth) <= SQUARES * positions.len();
-        let depths = DEPTHS.take_while(|depth| depth == DEPTHS.start() || holds_points(depth));
-        let depth = depths.clone().find(is_fine).or(depths.last()).unwrap_or(*DEPTHS.start());
-        Self { depth, ..grid }
+impl OrientedPoints {
+    fn new(positions: Vec<Point3<f64>>, normals: Vec<Vector3<f64>>, spacing: f64, noise: f64) -> Self {
+        let tree = PointTree::new(&positions);
+        Self { positions, normals, tree, spacing, width: (WIDTH.0 * spacing).max(WIDTH.1 * noise) }
     }
 
-    /// m
-    fn cell(&self) -> f64 {
-        let cells = (1u64 << self.depth) - 1;
-        self.side * (1.0 + 2.0 * PADDING) / cells as f64
+    /// f and its direction of growth at a place, by the mean of the planes of the points near it that face alike; `None` where there
+    /// are none.
+    fn plane_at(&self, p: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let mut facing = None;
+        let (mut weights, mut distance, mut normal) = (0.0, 0.0, Vector3::zeros());
+        for (at, far) in self.tree.nearest(p, AVERAGED, FARTHEST_WIDTHS * self.width) {
+            // the other side of a thin sheet is another surface
+            let n = self.normals[at];
+            if n.dot(facing.get_or_insert(n)) <= 0.0 {
+                continue;
+            }
+            let weight = (-0.5 * (far / self.width).powi(2)).exp();
+            weights += weight;
+            distance += weight * n.dot(&(p - self.positions[at]));
+            normal += n * weight;
+        }
+        (weights > 0.0).then(|| (distance / weights, normal.try_normalize(0.0).unwrap_or_else(Vector3::z)))
     }
 
-    fn point(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> NormalPoint3f {
-        let position = Point3::from((p - self.middle) / self.side).cast();
-        NormalPoint3f { position, normal: normal.cast() }
+    /// The zero set of f in the cells at the points and beside these.
+    fn contoured(&self, lattice: &Lattice) -> Soup {
+        let (mut region, mut nodes) = (LatticeRegion::default(), LatticeRegion::default());
+        for p in &self.positions {
+            let cell = lattice.cell_of(p);
+            for beside in (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]) {
+                region.insert_with(std::array::from_fn(|i| cell[i] + beside[i]), || ());
+            }
+        }
+        for (cell, ()) in region.iter() {
+            for corner in 0..8 {
+                nodes.insert_with(std::array::from_fn(|i| cell[i] + (corner >> i & 1)), || ());
+            }
+        }
+        let found = parallel::map(nodes.len(), |at| self.plane_at(&lattice.position(nodes.entry(at as u32).0)));
+        let mut values = NodeValues::default();
+        for ((node, ()), found) in nodes.iter().zip(found) {
+            found.into_iter().for_each(|(value, _)| values.insert(node, value));
+        }
+        let crossing = |edge: &Edge| {
+            let ends = [edge.node, edge.end()];
+            let known = ends.map(|node| values.get(&node).copied().unwrap_or_default());
+            self.crossing(ends.map(|node| lattice.position(node)), known)
+        };
+        let Patch { vertices, faces, .. } = contour(lattice, &region, &values, &Cut::default(), crossing);
+        let positions = vertices.iter().map(|(_, position)| *position).collect();
+        Soup { positions, faces: faces.iter().map(|face| face.corners).collect(), unused: 0 }
     }
 
-    fn solve(&self, points: Vec<NormalPoint3f>) -> Result<Soup, CloudError> {
-        let config = PoissonConfig { depth: self.depth, tolerance: TOLERANCE, ..PoissonConfig::default() };
-        let made = poisson_reconstruction(&PointCloud::from_points(points), &config);
-        let TriangleMesh { vertices, faces, .. } =
-            made.map_err(|why| CloudError::NoSurface { reason: why.to_string() })?;
-        let positions = vertices.iter().map(|v| self.middle + v.coords.cast() * self.side).collect();
-        let faces = faces.iter().map(|corners| corners.map(|v| v as u32)).collect();
-        Ok(Soup { positions, faces, unused: 0 })
+    /// Where f changes its sign between two places.
+    ///
+    /// - `values`: f there, m.
+    fn crossing(&self, mut ends: [Point3<f64>; 2], mut values: [f64; 2]) -> Crossing {
+        let [a, b] = ends;
+        let mut normal = (b - a) * (values[1] - values[0]).signum();
+        for _ in 0..STEPS {
+            let point = ends[0] + (ends[1] - ends[0]) * (values[0] / (values[0] - values[1]));
+            let Some((value, grows)) = self.plane_at(&point) else { break };
+            normal = grows;
+            // the end of the same sign moves up
+            let side = usize::from((value < 0.0) == (values[1] < 0.0));
+            (ends[side], values[side]) = (point, value);
+            if value == 0.0 {
+                break;
+            }
+        }
+        let share = if values[0] == values[1] { 0.5 } else { values[0] / (values[0] - values[1]) };
+        let normal = normal.try_normalize(0.0).unwrap_or_else(Vector3::z);
+        Crossing { point: ends[0] + (ends[1] - ends[0]) * share, normal }
     }
 }
 
 /// Leaves out the faces of which a vertex is not among the points.
-///
-/// - `reach`: spacing of the points or cell of the grid, whichever is larger, m.
-fn cut_invented(soup: &mut Soup, positions: &[Point3<f64>], reach: f64) {
-    let tree = PointTree::new(positions);
+fn cut_invented(soup: &mut Soup, points: &OrientedPoints) {
     let (count, within, part) = RIM_NEIGHBOURS;
     let is_scanned = parallel::map(soup.positions.len(), |at| {
         let vertex = soup.positions[at];
-        let near: Vec<_> = tree.nearest(&vertex, count, within * reach).collect();
+        let near: Vec<_> = points.tree.nearest(&vertex, count, within * points.spacing).collect();
         let [Some((_, nearest)), Some((_, farthest))] = [near.first(), near.last()] else { return false };
-        let middle = near.iter().map(|(at, _)| positions[*at] - vertex).sum::<Vector3<f64>>() / near.len() as f64;
-        *nearest <= FARTHEST * reach && middle.norm() <= part * farthest
+        let arms = near.iter().map(|(at, _)| points.positions[*at] - vertex);
+        let middle = arms.sum::<Vector3<f64>>() / near.len() as f64;
+        *nearest <= FARTHEST * points.spacing && middle.norm() <= part * farthest
     });
     soup.faces.retain(|corners| corners.iter().all(|&v| is_scanned[v as usize]));
 }
