@@ -4,14 +4,12 @@
 
 use libfuzzer_sys::fuzz_target;
 use touchup_fuzz::{assert_is_somewhere, file, place};
-use touchup_io::mesh_file::{MeshUnit, read_mesh, read_points, read_vertex_columns, write_mesh};
+use touchup_io::mesh_file::{MeshUnit, read_mesh, read_vertex_columns, write_mesh};
 
 fuzz_target!(|data: &[u8]| {
     let Some((&kind, bytes)) = data.split_first() else { return };
     let path = file(["scan.obj", "scan.stl", "scan.ply"][usize::from(kind) % 3], bytes);
     let unit = [MeshUnit::Millimetre, MeshUnit::Metre][usize::from(kind / 3) % 2];
-    // a PLY without faces is of the target `cloud`
-    let Ok(None) = read_points(&path, unit) else { return };
     let Ok(read) = read_mesh(&path, unit) else { return };
     assert_is_somewhere(&read.mesh);
     let columns = read_vertex_columns(&path, unit, &read.mesh, ["sigma_mm", "support"]).expect("it was read before");

@@ -20,11 +20,13 @@ use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, pr
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
 use crate::io::atomic::is_same_file;
-use crate::io::mesh_file::{CloudSummary, MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
+use crate::io::mesh_file::{MeshFileError, MeshUnit, check_target};
 use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
+use crate::reconstruct::CloudSummary;
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
+use crate::scan::{Scan, read_scan};
 use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
@@ -259,7 +261,7 @@ impl RefineArguments {
         let (scene, told) = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
-        let MeshFile { mesh, repair, cloud } = read_mesh(&self.scan, self.mesh_unit)?;
+        let Scan { mesh, repair, cloud } = read_scan(&self.scan, self.mesh_unit)?;
         let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;

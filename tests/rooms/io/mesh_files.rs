@@ -40,7 +40,7 @@ const NASTY: [(&str, Gives); 54] = {
         ("assimp_PLY_cube.ply", Mesh(Metre, [8, 12, 0, 0, 0])),
         ("assimp_PLY_cube_binary_starts_with_nl.ply", Mesh(Metre, [8, 12, 0, 0, 0])),
         ("assimp_PLY_issue623.ply", Error("line 14: expected a number, found 'the end of the line'")),
-        ("assimp_PLY_points.ply", Error("only 4 of its 4 points are of use and at least 50 are needed: scan the part more densely")),
+        ("assimp_PLY_points.ply", Error("no face in it, only 4 vertices: make a triangle mesh of it first")),
         ("assimp_STL_Spider_binary.stl", Mesh(Metre, [722, 1312, 72, 6, 0])),
         ("assimp_STL_triangle_with_empty_solid.stl", Mesh(Metre, [3, 1, 3, 1, 0])),
         ("assimp_invalid_OutOfMemory.off", Error("not a kind of mesh or point cloud known here: convert it to .ply, .stl, .obj, .pcd, .xyz or .e57")),
@@ -73,7 +73,7 @@ const NASTY: [(&str, Gives); 54] = {
         ("trimesh_empty.stl", Error("no face in it, only 0 vertices: make a triangle mesh of it first")),
         ("trimesh_emptyIO_obj_wireframe.obj", Error("no face in it, only 8 vertices: make a triangle mesh of it first")),
         ("trimesh_emptyIO_ply_empty_bin.ply", Error("no face in it, only 0 vertices: make a triangle mesh of it first")),
-        ("trimesh_emptyIO_ply_points_bin.ply", Error("only 8 of its 8 points are of use and at least 50 are needed: scan the part more densely")),
+        ("trimesh_emptyIO_ply_points_bin.ply", Error("no face in it, only 8 vertices: make a triangle mesh of it first")),
         ("trimesh_emptyIO_stl_empty_bin.stl", Error("no face in it, only 0 vertices: make a triangle mesh of it first")),
         ("trimesh_groups.obj", Mesh(Metre, [1156, 2308, 0, 0, 0])),
         ("trimesh_joined_tetrahedra.obj", Mesh(Metre, [5, 7, 0, 0, 3])),
@@ -81,7 +81,7 @@ const NASTY: [(&str, Gives); 54] = {
         ("trimesh_nancolor.obj", Mesh(Metre, [8, 12, 0, 0, 0])),
         ("trimesh_not_convex.obj", Mesh(Metre, [44, 96, 0, 0, 12])),
         ("trimesh_obj_with_no_face_in_chunk.obj", Mesh(Metre, [3, 1, 3, 1, 0])),
-        ("trimesh_points_emptyface.ply", Error("m is too large for a work-piece: the file is probably in millimetres, try --mesh-unit mm")),
+        ("trimesh_points_emptyface.ply", Error("no face in it, only 1024 vertices: make a triangle mesh of it first")),
         ("trimesh_quadknot.obj", Mesh(Millimetre, [1440, 2880, 0, 0, 0])),
         ("trimesh_singlevn.obj", Mesh(Millimetre, [4, 2, 4, 1, 0])),
         ("trimesh_two_objects_mixed_case_names.stl", Mesh(Metre, [16, 24, 0, 0, 0])),
@@ -95,7 +95,7 @@ fn every_nasty_file_gives_the_known_mesh_or_one_clear_line() {
         let path = folder.join(name);
         match gives {
             Gives::Mesh(unit, wanted) => {
-                let MeshFile { mesh, repair: r, .. } = read_mesh(&path, *unit).unwrap_or_else(|e| panic!("{e}"));
+                let MeshFile { mesh, repair: r } = read_mesh(&path, *unit).unwrap_or_else(|e| panic!("{e}"));
                 let got =
                     [mesh.vertex_count(), mesh.face_count(), r.boundary_edges, r.boundary_loops, r.non_manifold_edges];
                 assert_eq!(got, *wanted, "{name}: {r}");
@@ -149,7 +149,7 @@ fn real_parts_come_out_watertight() {
         ("godel_Tool_Mounting_Plate.STL", Metre, 11261, 22578, 7),
     ];
     for (name, unit, vertices, faces, bodies) in closed {
-        let MeshFile { mesh, repair: r, .. } = read_mesh(&parts.join(name), unit).unwrap();
+        let MeshFile { mesh, repair: r } = read_mesh(&parts.join(name), unit).unwrap();
         assert_eq!((mesh.vertex_count(), mesh.face_count(), r.boundary_edges), (vertices, faces, 0), "{name}: {r}");
         assert_eq!((r.components, r.non_manifold_edges), (bodies, 0), "{name}: {r}");
         assert!(volume(&mesh) > 0.0);
@@ -196,7 +196,7 @@ fn what_is_written_is_read_back() {
         for (unit, bound) in [(Metre, in_metres), (Millimetre, in_others), (Inch, in_others)] {
             let path = folder.path().join(format!("ball.{extension}"));
             write_mesh(&path, &ball, unit).unwrap();
-            let MeshFile { mesh, repair, .. } = read_mesh(&path, unit).unwrap();
+            let MeshFile { mesh, repair } = read_mesh(&path, unit).unwrap();
             assert_eq!((mesh.vertex_count(), mesh.face_count()), (ball.vertex_count(), ball.face_count()));
             assert_eq!((repair.flipped_faces, repair.boundary_edges, repair.components), (0, 0, 1));
             for (read, written) in corners_of(&mesh).as_flattened().iter().zip(corners_of(&ball).as_flattened()) {
@@ -223,7 +223,7 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
         ball.remove_face(face);
     }
     write_mesh(&path, &ball, Metre).unwrap();
-    let MeshFile { mesh, repair, .. } = read_mesh(&path, Metre).unwrap();
+    let MeshFile { mesh, repair } = read_mesh(&path, Metre).unwrap();
     assert_eq!(mesh.positions(), &ball.positions()[1..]);
     assert_eq!((mesh.face_count(), repair.unused_vertices, repair.boundary_loops), (ball.face_count(), 0, 1));
 }
@@ -288,7 +288,7 @@ fn ply_variants_are_read() {
         "ply\nformat ascii 1.0\n{header}element tristrips 1\nproperty list int int vertex_indices\nend_header\n{vertices}\
          8 0 1 3 2 -1 0 1 2\n"
     );
-    let MeshFile { mesh, repair, .. } = read_text("a.ply", strips.as_bytes()).unwrap();
+    let MeshFile { mesh, repair } = read_text("a.ply", strips.as_bytes()).unwrap();
     // faces 013, 312 and 012, of which the last is inverted
     assert_eq!((mesh.face_count(), repair.boundary_edges, repair.flipped_faces), (3, 3, 1));
     let refusal = |content: &str| count(content).unwrap_err().to_string();
@@ -407,9 +407,7 @@ proptest! {
         std::fs::write(&path, &bytes).unwrap();
         let (outcome, largest) = largest_request(|| read_mesh(&path, Metre));
         // 24 bytes of position for the 3 bytes of the shortest row, and what the tables need at least
-        // without its faces it is a cloud, for which a grid is taken
-        let is_cloud = matches!(&outcome, Ok(MeshFile { cloud: Some(_), .. }) | Err(MeshFileError::Cloud { .. }));
-        prop_assert!(is_cloud || largest <= 16 * bytes.len() + 4096, "{largest} bytes at once");
+        prop_assert!(largest <= 16 * bytes.len() + 4096, "{largest} bytes at once");
         match outcome {
             Ok(MeshFile { mesh, .. }) => prop_assert!(mesh.face_count() > 0),
             Err(error) => {

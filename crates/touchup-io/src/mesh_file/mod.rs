@@ -1,4 +1,4 @@
-//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in, of which a surface is made.
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in.
 
 mod column;
 mod defect;
@@ -20,10 +20,9 @@ use super::file_error::{FileError, read_file, write_file};
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
-use point_cloud::{Cloud, CloudError, CloudFormat};
-pub use point_cloud::{CloudSummary, NormalSource};
+use point_cloud::CloudFormat;
 use soup::Soup;
-use touchup_core::mesh::{FARTHEST, MeshError, RepairReport, TriMesh, is_place, repair};
+use touchup_core::mesh::{FARTHEST, MeshError, PointCloud, RepairReport, TriMesh, is_place, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Why a mesh file could not be read or written.
@@ -55,14 +54,6 @@ pub enum MeshFileError {
         path: PathBuf,
         /// how many points
         vertices: usize,
-    },
-    /// The points make no surface.
-    #[error("{}: {why}", path.display())]
-    Cloud {
-        /// the file
-        path: PathBuf,
-        /// why, and what to do
-        why: String,
     },
     /// E57 has a unit, and another one was named.
     #[error("{}: an E57 file is in metres by its standard, not in {unit}: --mesh-unit m", path.display())]
@@ -105,8 +96,6 @@ pub struct MeshFile {
     pub mesh: TriMesh,
     /// defects of the file
     pub repair: RepairReport,
-    /// how the mesh was made, where the file holds points
-    pub cloud: Option<CloudSummary>,
 }
 
 #[derive(Clone, Copy)]
@@ -137,87 +126,90 @@ impl Format {
     }
 }
 
-/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]); of a point cloud (PLY without faces, PCD, text, E57) a surface is made, which a
-/// warning says.
+/// What a file holds.
+#[derive(Clone, Debug)]
+pub enum MeshOrPoints {
+    /// triangles, repaired
+    Mesh(MeshFile),
+    /// points alone, as they are in the file, also those without a place
+    Points(PointCloud),
+}
+
+/// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
 ///
 /// The content decides about the format where it is unmistakable, the extension otherwise.
 ///
 /// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
 ///
 /// # Errors
-/// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
+/// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud is one.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
-    let (soup, cloud) = match Scan::read(path, unit)? {
-        Scan::Triangles(soup) => (soup, None),
-        Scan::Points(cloud) => {
-            let no_surface = |why: CloudError| MeshFileError::Cloud { path: path.into(), why: why.to_string() };
-            let (soup, summary) = point_cloud::surface(cloud).map_err(no_surface)?;
-            (soup, Some(summary))
+    match read_mesh_or_points(path, unit)? {
+        MeshOrPoints::Mesh(file) => Ok(file),
+        MeshOrPoints::Points(cloud) => {
+            Err(MeshFileError::NoFaces { path: path.into(), vertices: cloud.positions.len() })
         }
-    };
-    let Soup { positions, faces, unused } = soup;
-    if faces.is_empty() {
-        return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
     }
-    let (mesh, mut report) =
-        repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
-    report.unused_vertices += unused;
-    let [low, high] = mesh.bounds();
-    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
-    if let Some(summary) = &cloud {
-        tracing::warn!("{}: {summary}", path.display());
-    }
-    Ok(MeshFile { mesh, repair: report, cloud })
 }
 
-/// The points of a point cloud as they are in the file, m, also those without a place; `None` of a mesh.
+/// [`read_mesh`], or the points of a point cloud: PLY without faces, PCD, text, E57.
 ///
-/// - `unit`: the unit of the coordinates in the file.
+/// - `unit`: the unit of the coordinates in the file; an E57 is in m.
 ///
 /// # Errors
 /// As [`read_mesh`].
-pub fn read_points(path: &Path, unit: MeshUnit) -> Result<Option<Vec<Point3<f64>>>, MeshFileError> {
-    Ok(match Scan::read(path, unit)? {
-        Scan::Triangles(_) => None,
-        Scan::Points(cloud) => Some(cloud.positions),
-    })
-}
-
-/// What a file holds.
-enum Scan {
-    Triangles(Soup),
-    Points(Cloud),
-}
-
-impl Scan {
-    fn read(path: &Path, unit: MeshUnit) -> Result<Self, MeshFileError> {
-        let bytes = read_file(path)?;
-        let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
-        if bytes.is_empty() {
-            return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
-        }
-        match cloud_format(&bytes, path) {
-            Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
-                return Err(MeshFileError::UnitOfE57 { path: path.into(), unit });
-            }
-            Some(format) => return Ok(Self::Points(format.read(&bytes, unit).map_err(syntax)?)),
-            None => {}
-        }
-        let scale = unit.metres();
-        let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)? {
-            Format::Stl => stl::read(&bytes, scale),
-            Format::Obj => obj::read(&bytes, scale),
-            Format::Ply => match ply::read(&bytes, scale) {
-                Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
-                    let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
-                    let (positions, normals) = columns.map_err(syntax)?;
-                    return Ok(Self::Points(point_cloud::of_ply(positions, normals)));
-                }
-                soup => soup,
-            },
-        };
-        Ok(Self::Triangles(soup.map_err(syntax)?))
+pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, MeshFileError> {
+    let bytes = read_file(path)?;
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    if bytes.is_empty() {
+        return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
     }
+    match cloud_format(&bytes, path) {
+        Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
+            return Err(MeshFileError::UnitOfE57 { path: path.into(), unit });
+        }
+        Some(format) => return Ok(MeshOrPoints::Points(format.read(&bytes, unit).map_err(syntax)?)),
+        None => {}
+    }
+    let scale = unit.metres();
+    let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)? {
+        Format::Stl => stl::read(&bytes, scale),
+        Format::Obj => obj::read(&bytes, scale),
+        Format::Ply => match ply::read(&bytes, scale) {
+            Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
+                let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
+                let (positions, normals) = columns.map_err(syntax)?;
+                return Ok(MeshOrPoints::Points(point_cloud::of_ply(positions, normals)));
+            }
+            soup => soup,
+        },
+    };
+    let Soup { positions, faces, unused } = soup.map_err(syntax)?;
+    if faces.is_empty() {
+        return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
+    }
+    let mut file = repaired(path, unit, positions, faces)?;
+    file.repair.unused_vertices += unused;
+    Ok(MeshOrPoints::Mesh(file))
+}
+
+/// The mesh of what `path` holds, repaired ([`repair`]).
+///
+/// - `unit`: of the file, for what is said of a size that cannot be right; `positions`: m.
+///
+/// # Errors
+/// [`MeshFileError::Mesh`], [`MeshFileError::Implausible`].
+pub fn repaired(
+    path: &Path,
+    unit: MeshUnit,
+    positions: Vec<Point3<f64>>,
+    faces: Vec<[u32; 3]>,
+) -> Result<MeshFile, MeshFileError> {
+    let (mesh, repair) =
+        repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
+    let [low, high] = mesh.bounds();
+    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
+    Ok(MeshFile { mesh, repair })
 }
 
 /// The format of a file that holds nothing but points.

@@ -6,8 +6,8 @@ use e57::{CartesianCoordinate, E57Reader};
 use nalgebra::{Point3, Vector3};
 
 use super::super::defect::{Defect, Syntax};
-use super::cloud::{Cloud, Station};
 use crate::file_error::FilePlace;
+use touchup_core::mesh::{PointCloud, ScanStation};
 
 /// Whether the file begins as E57 does.
 pub(super) fn is_e57(bytes: &[u8]) -> bool {
@@ -16,10 +16,10 @@ pub(super) fn is_e57(bytes: &[u8]) -> bool {
 
 /// Reads the points of all scans in the frame of the file, each scan by its pose; coordinates are multiplied by `scale`. Points that the
 /// file calls invalid come out as NaN.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let foreign = |offset: u64| move |why: e57::Error| Syntax { place: FilePlace::Byte(offset), defect: defect(&why) };
     let mut reader = E57Reader::new(Cursor::new(bytes)).map_err(foreign(0))?;
-    let mut cloud = Cloud::default();
+    let mut cloud = PointCloud::default();
     for scan in reader.pointclouds() {
         check_count(scan.records, scan.file_offset, bytes.len())?;
         let first = cloud.positions.len();
@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
         }
         let origin = scan.transform.as_ref().map(|pose| &pose.translation);
         let eye = origin.map(|at| Point3::new(at.x, at.y, at.z) * scale);
-        cloud.stations.push(Station { points: cloud.positions.len() - first, eye, is_sure: eye.is_some() });
+        cloud.stations.push(ScanStation { points: cloud.positions.len() - first, eye, is_sure: eye.is_some() });
     }
     match cloud.positions.is_empty() {
         true => Err(Syntax { place: FilePlace::Byte(0), defect: Defect::NoPoints }),

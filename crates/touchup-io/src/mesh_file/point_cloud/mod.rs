@@ -1,23 +1,15 @@
-//! Point clouds as scans: PLY without faces, PCD, text and E57 in; a surface is made through the points.
+//! Point clouds: PLY without faces, PCD, text and E57 in.
 
-mod cloud;
 mod e57;
 mod lzf;
-mod normals;
-mod parallel;
 mod pcd;
-mod summary;
-mod surface;
 mod text;
 
 use nalgebra::{Point3, Vector3};
 
 use super::defect::Syntax;
-use super::soup::Soup;
 use super::unit::MeshUnit;
-pub(super) use cloud::{Cloud, Station};
-pub use summary::{CloudSummary, NormalSource};
-pub(super) use surface::CloudError;
+use touchup_core::mesh::{PointCloud, ScanStation};
 
 /// The kinds of files that hold nothing but points.
 #[derive(Clone, Copy)]
@@ -48,7 +40,7 @@ impl CloudFormat {
     }
 
     /// Coordinates come out multiplied by the unit.
-    pub fn read(self, bytes: &[u8], unit: MeshUnit) -> Result<Cloud, Syntax> {
+    pub fn read(self, bytes: &[u8], unit: MeshUnit) -> Result<PointCloud, Syntax> {
         match self {
             Self::Pcd => pcd::read(bytes, unit.metres()),
             Self::Text => text::read(bytes, unit.metres()),
@@ -60,7 +52,7 @@ impl CloudFormat {
 /// The points of a PLY file.
 ///
 /// - `positions`: m; `normals`: of each its three coordinates, where the file has them.
-pub(super) fn of_ply(positions: Vec<Point3<f64>>, normals: [Option<Vec<f32>>; 3]) -> Cloud {
+pub(super) fn of_ply(positions: Vec<Point3<f64>>, normals: [Option<Vec<f32>>; 3]) -> PointCloud {
     let normals = match normals {
         [Some(x), Some(y), Some(z)] => {
             let rows = x.into_iter().zip(y).zip(z);
@@ -68,12 +60,5 @@ pub(super) fn of_ply(positions: Vec<Point3<f64>>, normals: [Option<Vec<f32>>; 3]
         }
         _ => Vec::new(),
     };
-    Cloud { stations: vec![Station { points: positions.len(), eye: None, is_sure: false }], positions, normals }
-}
-
-/// The surface through the points, m, and what is to be said of it.
-pub(super) fn surface(cloud: Cloud) -> Result<(Soup, CloudSummary), CloudError> {
-    let (cloud, mut summary) = cloud.cleaned();
-    let soup = surface::reconstruct(cloud, &mut summary)?;
-    Ok((soup, summary))
+    PointCloud { stations: vec![ScanStation::unknown(positions.len())], positions, normals }
 }

@@ -4,10 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::defect::{Defect, Syntax};
 use super::super::text::{NumberedLines, number};
-use super::cloud::{Cloud, Station};
 use super::lzf;
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
+use touchup_core::mesh::{PointCloud, ScanStation};
 
 /// The fields that are read: the place, which there must be, and the normal, which there may be.
 const NAMES: [&str; 6] = ["x", "y", "z", "normal_x", "normal_y", "normal_z"];
@@ -72,11 +72,11 @@ pub(super) fn is_pcd(bytes: &[u8]) -> bool {
 }
 
 /// Reads places and normals; coordinates are multiplied by `scale`.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let header = PcdHeader::read(bytes)?;
     let columns = header.columns()?;
     let body = &bytes[header.len..];
-    let mut cloud = Cloud::default();
+    let mut cloud = PointCloud::default();
     // every point takes at least a byte, which is checked before anything is reserved
     let mut take = |row: [f64; 6], has_normals: bool| {
         cloud.positions.push(Point3::new(row[0], row[1], row[2]) * scale);
@@ -104,7 +104,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
     let is_grid = header.height > 1;
     let eye = header.eye.or(is_grid.then(Point3::origin)).map(|eye| eye * scale);
     let is_sure = is_grid || eye.is_some_and(|eye| eye != Point3::origin());
-    cloud.stations = vec![Station { points: cloud.positions.len(), eye, is_sure }];
+    cloud.stations = vec![ScanStation { points: cloud.positions.len(), eye, is_sure }];
     Ok(cloud)
 }
 
@@ -347,7 +347,7 @@ mod tests {
             assert!(cloud.positions[1].x.is_nan());
             assert_eq!([cloud.positions[1].y, cloud.positions[1].z], [5.0, 6.0]);
             assert!(cloud.normals.iter().all(|n| (n - Vector3::new(0.0, 0.6, 0.8)).norm() < 1e-7), "{cloud:?}");
-            let Station { points, eye, is_sure } = cloud.stations[0];
+            let ScanStation { points, eye, is_sure } = cloud.stations[0];
             assert_eq!((points, eye, is_sure), (2, Some(Point3::new(0.0, 0.0, 2.0)), true));
         }
     }

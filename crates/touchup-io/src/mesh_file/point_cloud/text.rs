@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::defect::{Defect, Syntax};
 use super::super::text::NumberedLines;
-use super::cloud::{Cloud, Station};
 use crate::file_error::FilePlace;
+use touchup_core::mesh::{PointCloud, ScanStation};
 
 /// Bytes of the shortest line: three digits and what separates them.
 const SHORTEST: usize = 6;
@@ -15,7 +15,7 @@ const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 /// Reads lines of numbers, separated by blanks, tabs, commas or semicolons; coordinates are multiplied by `scale`. Lines that begin with
 /// `#`, `//` or a letter, and the number of the points in the first line, are passed over. Columns 4 to 6, or the last three, are the
 /// normals where they are of length 1 in every line.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut lines = NumberedLines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), end_of_line);
     let mut positions = Vec::with_capacity(bytes.len() / (4 * SHORTEST));
@@ -43,8 +43,8 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Cloud, Syntax> {
     if positions.is_empty() {
         return Err(Syntax { place: FilePlace::Line(lines.number().max(1)), defect: Defect::NoPoints });
     }
-    let stations = vec![Station { points: positions.len(), eye: None, is_sure: false }];
-    Ok(Cloud { positions, normals: normals.found(), stations })
+    let stations = vec![ScanStation::unknown(positions.len())];
+    Ok(PointCloud { positions, normals: normals.found(), stations })
 }
 
 /// A line that is none of numbers; "nan" and "inf" are numbers.

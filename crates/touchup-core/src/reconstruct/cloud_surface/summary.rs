@@ -39,6 +39,8 @@ pub struct CloudSummary {
     pub spacing_mm: f64,
     /// median distance of the points from a plane through their neighbours
     pub noise_mm: f64,
+    /// standard deviation of the surface from the part, where that is smooth: its edges are rounded by up to half a cell
+    pub error_mm: f64,
     /// faces made
     pub faces: usize,
     /// faces cut away because no point is near
@@ -63,8 +65,8 @@ impl fmt::Display for CloudSummary {
         write!(
             f,
             ", a surface of {faces} faces made through them by {reconstruction}, resolution {:.2} mm, points {:.2} mm apart with {:.2} mm \
-             noise, {normals}",
-            self.resolution_mm, self.spacing_mm, self.noise_mm
+             noise: {:.3} mm of error to expect where it is smooth, half the resolution at edges; {normals}",
+            self.resolution_mm, self.spacing_mm, self.noise_mm, self.error_mm
         )
     }
 }
