@@ -136,20 +136,46 @@ fn cut_invented(vertices: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, points: &Or
     faces.retain(|corners| corners.iter().all(|&v| is_scanned[v as usize]));
 }
 
-/// Takes the vertices of the smallest holes for scanned.
+/// Takes the vertices of the smallest holes for scanned; no hole is what ends at a rim.
 fn keep_pinholes_closed(faces: &[[u32; 3]], is_scanned: &mut [bool]) {
+    let is_invented = |v: &u32| !is_scanned[*v as usize];
+    let at_invented = faces.iter().filter(|corners| corners.iter().any(is_invented));
+    let mut edges: Vec<[u32; 2]> = at_invented.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    edges.sort_unstable();
     let mut sets = DisjointSets::of(is_scanned.len());
-    for corners in faces {
-        for [a, b] in [[0, 1], [1, 2], [2, 0]].map(|edge| edge.map(|at| corners[at])) {
-            if !is_scanned[a as usize] && !is_scanned[b as usize] {
-                sets.join(a, b);
-            }
-        }
-    }
+    edges.iter().filter(|edge| edge.iter().all(is_invented)).for_each(|&[a, b]| sets.join(a, b));
     let mut sizes = vec![0; is_scanned.len()];
-    let invented: Vec<u32> = (0..is_scanned.len() as u32).filter(|&v| !is_scanned[v as usize]).collect();
+    let invented: Vec<u32> = (0..is_scanned.len() as u32).filter(is_invented).collect();
     invented.iter().for_each(|&v| sizes[sets.root(v) as usize] += 1);
+    for &[a, b] in edges.iter().filter(|[a, b]| edges.binary_search(&[*b, *a]).is_err()) {
+        [a, b].iter().filter(|v| is_invented(v)).for_each(|&v| sizes[sets.root(v) as usize] = usize::MAX);
+    }
     for v in invented {
         is_scanned[v as usize] = sizes[sets.root(v) as usize] <= PINHOLE;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pinhole_closes_and_a_hole_and_a_rim_stay_as_they_are() {
+        // a square of 12 by 12 vertices
+        let at = |x: u32, y: u32| 12 * y + x;
+        let cells = (0..11).flat_map(|y| (0..11).map(move |x| (x, y)));
+        let halves = |(x, y)| {
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+            [[a, b, c], [a, c, d]]
+        };
+        let faces: Vec<_> = cells.flat_map(halves).collect();
+        let pinhole = [at(3, 3), at(4, 3)];
+        let hole = [at(7, 7), at(8, 7), at(7, 8), at(8, 8)];
+        let rim = [at(0, 5), at(1, 5)];
+        let mut is_scanned = vec![true; 144];
+        [&pinhole[..], &hole, &rim].concat().iter().for_each(|&v| is_scanned[v as usize] = false);
+        keep_pinholes_closed(&faces, &mut is_scanned);
+        let left: Vec<u32> = (0..144).filter(|&v| !is_scanned[v as usize]).collect();
+        assert_eq!(left, [at(0, 5), at(1, 5), at(7, 7), at(8, 7), at(7, 8), at(8, 8)]);
     }
 }
