@@ -44,7 +44,10 @@ pub struct Scan {
 /// [`ScanError`]: one line that names the file and what to do.
 pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     let cloud = match read_mesh_or_points(path, unit)? {
-        MeshOrPoints::Mesh(MeshFile { mesh, repair }) => return Ok(Scan { mesh, repair, cloud: None }),
+        MeshOrPoints::Mesh(file) => {
+            let MeshFile { mesh, repair } = *file;
+            return Ok(Scan { mesh, repair, cloud: None });
+        }
         MeshOrPoints::Points(cloud) => cloud,
     };
     let no_surface = |source| ScanError::Cloud { path: path.into(), source };

@@ -130,7 +130,7 @@ impl Format {
 #[derive(Clone, Debug)]
 pub enum MeshOrPoints {
     /// triangles, repaired
-    Mesh(MeshFile),
+    Mesh(Box<MeshFile>),
     /// points alone, as they are in the file, also those without a place
     Points(PointCloud),
 }
@@ -145,7 +145,7 @@ pub enum MeshOrPoints {
 /// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud is one.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
     match read_mesh_or_points(path, unit)? {
-        MeshOrPoints::Mesh(file) => Ok(file),
+        MeshOrPoints::Mesh(file) => Ok(*file),
         MeshOrPoints::Points(cloud) => {
             Err(MeshFileError::NoFaces { path: path.into(), vertices: cloud.positions.len() })
         }
@@ -190,7 +190,7 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
     }
     let mut file = repaired(path, unit, positions, faces)?;
     file.repair.unused_vertices += unused;
-    Ok(MeshOrPoints::Mesh(file))
+    Ok(MeshOrPoints::Mesh(Box::new(file)))
 }
 
 /// The mesh of what `path` holds, repaired ([`repair`]).
