@@ -6,10 +6,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use touchup::align::{IcpParams, icp};
-use touchup::cli::Threads;
 use touchup::compare::deviations;
 use touchup::mesh::{Alone, FaceTree, TriMesh, Workers};
 use touchup::sim::wavy;
+use touchup::threads::Threads;
 
 /// Standard deviation of a point on each axis, m.
 const NOISE: f64 = 0.05e-3;

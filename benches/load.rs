@@ -1,4 +1,5 @@
-//! Reading a mesh file of a million triangles, with repair and adjacency: `cargo bench --bench load`.
+//! Reading a mesh file of a million triangles, with repair and adjacency; and of five million with the tree over its faces:
+//! `cargo bench --bench load`.
 
 use std::fs::File;
 use std::hint::black_box;
@@ -8,19 +9,18 @@ use std::path::PathBuf;
 use nalgebra::Point3;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
-use touchup::mesh::{TriMesh, repair};
+use touchup::mesh::{FaceTree, TriMesh, repair};
 
-/// A wavy sheet of 1000 x 500 quads, 1 m x 0.5 m.
-const QUADS: [u32; 2] = [1000, 500];
-const FACES: usize = 2 * (QUADS[0] * QUADS[1]) as usize;
-const VERTICES: usize = ((QUADS[0] + 1) * (QUADS[1] + 1)) as usize;
+/// Quads of 1 mm in a row, and rows, of a wavy sheet: a million triangles …
+const MILLION: [u32; 2] = [1000, 500];
+/// … and five.
+const FIVE_MILLION: [u32; 2] = [2000, 1250];
 
 fn main() {
     divan::main();
 }
 
-fn sheet() -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
-    let [columns, rows] = QUADS;
+fn sheet([columns, rows]: [u32; 2]) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
     let point = |i: u32, j: u32| {
         let (x, y) = (f64::from(i) * 1e-3, f64::from(j) * 1e-3);
         Point3::new(x, y, 0.02 * (17.0 * x).sin() * (23.0 * y).cos())
@@ -35,10 +35,11 @@ fn sheet() -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
 }
 
 /// The sheet as a file, read once and compared.
-fn file(name: &str) -> (TempDir, PathBuf) {
+fn file(name: &str, quads: [u32; 2]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(name);
-    let (positions, faces) = sheet();
+    let (positions, faces) = sheet(quads);
+    let counts = (positions.len(), faces.len());
     if name == "single.ply" {
         write_single(&path, &positions, &faces);
     } else {
@@ -46,7 +47,7 @@ fn file(name: &str) -> (TempDir, PathBuf) {
         write_mesh(&path, &mesh, MeshUnit::Metre).expect("room for the file");
     }
     let read = read_mesh(&path, MeshUnit::Metre).expect("the file just written");
-    assert_eq!((read.mesh.vertex_count(), read.mesh.face_count()), (VERTICES, FACES));
+    assert_eq!((read.mesh.vertex_count(), read.mesh.face_count()), counts);
     assert_eq!((read.repair.components, read.repair.boundary_loops, read.repair.flipped_faces), (1, 1, 0));
     (folder, path)
 }
@@ -55,8 +56,10 @@ fn file(name: &str) -> (TempDir, PathBuf) {
 fn write_single(path: &PathBuf, positions: &[Point3<f64>], faces: &[[u32; 3]]) {
     let mut out = BufWriter::new(File::create(path).expect("a temporary file"));
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {VERTICES}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {FACES}\nproperty list uchar int vertex_indices\nend_header\n"
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        positions.len(),
+        faces.len(),
     );
     let mut put = |bytes: &[u8]| out.write_all(bytes).expect("room for the file");
     put(header.as_bytes());
@@ -71,20 +74,29 @@ fn write_single(path: &PathBuf, positions: &[Point3<f64>], faces: &[[u32; 3]]) {
 /// `single.ply`: as most programs write it; `double.ply`, `.stl`, `.obj`: as this one does.
 #[divan::bench(args = ["single.ply", "double.ply", "binary.stl", "text.obj"], sample_count = 10)]
 fn load(bencher: divan::Bencher, name: &str) {
-    let (_folder, path) = file(name);
+    let (_folder, path) = file(name, MILLION);
     bencher.bench_local(|| read_mesh(black_box(&path), MeshUnit::Metre).expect("read before"));
+}
+
+/// Five million triangles, and the tree over them.
+#[divan::bench(args = ["single.ply", "binary.stl"], sample_count = 10)]
+fn load_to_tree(bencher: divan::Bencher, name: &str) {
+    let (_folder, path) = file(name, FIVE_MILLION);
+    bencher.bench_local(|| FaceTree::new(&read_mesh(black_box(&path), MeshUnit::Metre).expect("read before").mesh));
 }
 
 /// The part of it that checks, welds, orients and builds the adjacency.
 #[divan::bench(sample_count = 10)]
 fn repair_only(bencher: divan::Bencher) {
-    bencher.with_inputs(sheet).bench_local_values(|(positions, faces)| repair(positions, faces).expect("sound"));
+    bencher
+        .with_inputs(|| sheet(MILLION))
+        .bench_local_values(|(positions, faces)| repair(positions, faces).expect("sound"));
 }
 
 /// What `tobj` takes of `text.obj`, for comparison.
 #[divan::bench(sample_count = 5)]
 fn tobj_only(bencher: divan::Bencher) {
-    let (_folder, path) = file("text.obj");
+    let (_folder, path) = file("text.obj", MILLION);
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     bencher.bench_local(|| tobj::load_obj(black_box(&path), &options).expect("read before"));
 }

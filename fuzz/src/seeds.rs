@@ -29,6 +29,12 @@ const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\np
                    4 0 1 2 3\n";
 const PLY_BINARY: &str = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                           element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+const PLY_POINTS: &str = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty float nx\n\
+                          property float ny\nproperty float nz\nend_header\n0 0 0 0 0 1\n1 0 0 0 1 0\n";
+const PCD: &str = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
+                   VIEWPOINT 0 0 1 1 0 0 0\nPOINTS 2\nDATA ascii\n1 2 3 9\nnan 5 6 9\n";
+const PCD_PACKED: &str =
+    "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary_compressed\n";
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_0.mcap\n  \
                         duration: {nanoseconds: 1000000}\n  message_count: 2\n";
 const FEATURES: &str = r#"{"features":[{"id":1,"kind":"hole","center_mm":[1,2,3],"axis":[0,0,1],"diameter_mm":8.0,
@@ -47,6 +53,25 @@ const TOUCHES: &str = "0,1000,0,1,2,3,1.5,1,2,1.5,0,0,1,0.01,0.005,1,0\n";
 const TOUCH_LINE: &str = r#"{"flag":1,"index":0,"begun_ns":1,"ended_ns":2,"verdict":"clean","accepted":true,"from_mm":[1,2,3],
 "approach":[0,0,-1],"search_mm":5.0,"centre_mm":[1,2,3],"sigma_mm":0.01,"deviation_mm":0.1,"speed_mm_per_s":1.0,"tip_radius_mm":1.5,
 "largest_force_n":2.0,"curve":[[0,1,2,3]]}"#;
+
+/// Two points of one scan with a pose.
+fn e57_bytes() -> Vec<u8> {
+    use e57::{E57Writer, Record, RecordValue, Transform};
+    let mut bytes = Cursor::new(Vec::new());
+    let mut write = || -> e57::Result<()> {
+        let mut writer = E57Writer::new(&mut bytes, "file")?;
+        let records = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+        let mut scan = writer.add_pointcloud("scan", records)?;
+        scan.set_transform(Some(Transform::default()));
+        for x in [0.0, 1.0] {
+            scan.add_point([x, 0.0, 1.0].map(RecordValue::Double).to_vec())?;
+        }
+        scan.finalize()?;
+        writer.finalize()
+    };
+    write().expect("memory takes it");
+    bytes.into_inner()
+}
 
 /// An MCAP file without chunks, index and end, its messages on the topics of a touch by their number.
 pub fn mcap_of(messages: &[(u16, &[u8])]) -> Vec<u8> {
@@ -157,7 +182,7 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
     let mut scenes: Vec<_> = template.split("\n\n").map(|section| without_comments(section).into_bytes()).collect();
     scenes.push(b"contact: {}\ntip: {radius_mm: 1.5}\nrefine: {mode: paper}\npatch: {pitch_mm: 1}\nmarkers: {positions_mm: [[0, 0, 0]]}".into());
     let touches = [touchup_io::touches_file::HEADER, "\n", TOUCHES].concat();
-    let all: [(&str, Vec<Vec<u8>>); 14] = [
+    let all: [(&str, Vec<Vec<u8>>); 15] = [
         (
             "mesh",
             vec![
@@ -166,6 +191,16 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
                 kind(4, &stl_binary),
                 kind(2, PLY.as_bytes()),
                 kind(5, &ply_binary),
+            ],
+        ),
+        (
+            "cloud",
+            vec![
+                kind(0, PCD.as_bytes()),
+                kind(0, &[PCD_PACKED.as_bytes(), &[14, 0, 0, 0, 12, 0, 0, 0, 11], &[0; 12], &[0]].concat()),
+                kind(1, b"# x y z\n1 2 3 0 0 1\n4;5;6;0;1;0\n"),
+                kind(2, &e57_bytes()),
+                kind(3, PLY_POINTS.as_bytes()),
             ],
         ),
         ("scene", scenes),

@@ -10,7 +10,7 @@ use super::probing::{KeptMeasurements, Ready, SpotWorld, millimetres};
 use super::progress::WorkProgress;
 use super::signals::StopSignals;
 use crate::calibrate::ReferenceSphere;
-use crate::io::mesh_file::{MeshUnit, read_mesh};
+use crate::io::mesh_file::MeshUnit;
 use crate::mesh::TriMesh;
 use crate::probing::arm::Arm;
 use crate::probing::execute::{Cell, Prober};
@@ -18,6 +18,7 @@ use crate::probing::execute::{Cell, Prober};
 use crate::ros::arguments::NodeConfig;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros2_control::{ArmTopics, Ros2ControlArm, Ros2ControlParams};
+use crate::scan::read_scan;
 #[cfg(feature = "ur")]
 use crate::scene::RobotSection;
 use crate::scene::Scene;
@@ -164,7 +165,7 @@ pub(super) struct ArmArguments {
 #[derive(Debug, Args)]
 #[group(id = "cell")]
 pub(super) struct CellArguments {
-    /// The scan: PLY, STL or OBJ; not needed when the scene names its file
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
     /// Unit of the coordinates in the scan's file, and in the part's
@@ -287,6 +288,6 @@ impl CellArguments {
     fn part(&self) -> Result<TriMesh, CliError> {
         let missing = || CliError::usage("--robot sim needs the part that it touches: --truth MESH");
         let truth = self.truth.as_ref().ok_or_else(missing)?;
-        Ok(read_mesh(truth, self.mesh_unit).map_err(CliError::truth)?.mesh)
+        Ok(read_scan(truth, self.mesh_unit).map_err(CliError::truth)?.mesh)
     }
 }

@@ -13,14 +13,16 @@ use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by
 use self::table::{CompareReport, diagonal};
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
-use super::{CliError, Losses, Threads, check_outputs, print_report, require};
+use super::{CliError, Losses, check_outputs, print_report, require};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
     colour_of, compare as compare_shapes,
 };
 use crate::io::features_file::{FeatureRecord, read_features};
-use crate::io::mesh_file::{MeshFile, MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
+use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
 use crate::mesh::{FaceTree, TriMesh};
+use crate::scan::{Scan, read_scan};
+use crate::threads::Threads;
 
 /// Tolerance in the picture of a folder, mm: medium of ISO 2768-1 for lengths of up to 6 mm.
 const TOLERANCE_MM: f64 = 0.1;
@@ -30,7 +32,7 @@ const SAMPLES: u32 = 200_000;
 
 #[derive(Debug, Default, Args)]
 pub(super) struct CompareArguments {
-    /// The mesh to be judged: PLY, STL or OBJ; of a refined PLY touched and untouched parts are listed apart
+    /// The mesh to be judged: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; of a refined PLY touched and untouched parts are listed apart
     mesh: PathBuf,
     /// The nominal or true part: PLY, STL or OBJ
     truth: PathBuf,
@@ -132,9 +134,9 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     arguments.check_alignment()?;
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
-    let MeshFile { mesh: as_read, .. } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
-    let MeshFile { mesh: truth, .. } = read_mesh(&arguments.truth, arguments.truth_unit).map_err(CliError::truth)?;
-    let before = arguments.before.as_ref().map(|path| read_mesh(path, arguments.mesh_unit)).transpose();
+    let Scan { mesh: as_read, .. } = read_scan(&arguments.mesh, arguments.mesh_unit)?;
+    let Scan { mesh: truth, .. } = read_scan(&arguments.truth, arguments.truth_unit).map_err(CliError::truth)?;
+    let before = arguments.before.as_ref().map(|path| read_scan(path, arguments.mesh_unit)).transpose();
     let before = before?.map(|file| file.mesh);
     let regions = read_regions(&arguments.mesh, arguments.mesh_unit, &as_read)?;
     if let Some(hint) = unit_hint([&as_read, &truth], [arguments.mesh_unit, arguments.truth_unit]) {

@@ -13,13 +13,14 @@ use crate::compare::{
     BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams, RefinedShape,
     RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
 };
-use crate::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns};
+use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
 use crate::io::touches_file::read_touches;
 use crate::mesh::{FaceTree, TriMesh};
+use crate::scan::read_scan;
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {
-    /// The scan before refinement: PLY, STL or OBJ
+    /// The scan before refinement: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     scan: PathBuf,
     /// The refined mesh: a PLY of refine, which marks what was touched
     refined: PathBuf,
@@ -125,7 +126,7 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
     let unit = arguments.mesh_unit;
-    let [scan, refined] = [&arguments.scan, &arguments.refined].map(|path| read_mesh(path, unit));
+    let [scan, refined] = [&arguments.scan, &arguments.refined].map(|path| read_scan(path, unit));
     let (scan, refined) = (scan?.mesh, refined?.mesh);
     let known = read_known(&arguments.refined, unit, &refined)?;
     let touches = read_touches(&arguments.touches)?;

@@ -12,15 +12,16 @@ use super::progress::WorkProgress;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use crate::diagnose::{InputFinding, InputMonitor};
-use crate::io::mesh_file::{MeshUnit, read_mesh};
+use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::{StampSource, Topics};
 use crate::mesh::FaceTree;
 use crate::replay::{Recording, each_sample, marker_filter};
+use crate::scan::read_scan;
 use crate::stylus::{ContactEstimator, ContactEstimatorParams};
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
-    /// The scan: PLY, STL or OBJ
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
@@ -81,7 +82,7 @@ pub(super) const UNSOUND: (&str, u8) = ("input", 3);
 /// The command: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
-    let scan = read_mesh(&arguments.scan, arguments.mesh_unit)?.mesh;
+    let scan = read_scan(&arguments.scan, arguments.mesh_unit)?.mesh;
     let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };

@@ -19,6 +19,7 @@ use crate::probing::plan::ExploreError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeError;
+use crate::scan::ScanError;
 use crate::scene::SceneError;
 use crate::session::OutcomeError;
 use crate::sim::SimError;
@@ -79,7 +80,7 @@ impl CliError {
     }
 
     /// A true part that cannot be read; it has a flag of its own.
-    pub fn truth(error: MeshFileError) -> Self {
+    pub fn truth(error: ScanError) -> Self {
         Self::new(("mesh", 3), error.to_string().replace("--mesh-unit", "--truth-unit"), Some(&error))
     }
 
@@ -183,6 +184,7 @@ errors_of_rooms! {
     // settings come from a scene file: its flags are checked before
     crate::stylus::SettingError => |_| ("scene", 3), "";
     MeshFileError => |_| ("mesh", 3), "";
+    ScanError => |_| ("mesh", 3), "";
     crate::mesh::MeshError => |_| ("mesh", 3), "";
     crate::io::recording::RecordingError => |_| ("recording", 3), "";
     crate::session::SessionError => |_| ("session", 3), "";

@@ -12,14 +12,15 @@ use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, p
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
 use crate::io::features_file::{FeatureFile, write_features};
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::mesh_file::MeshUnit;
 use crate::io::touches_file::read_touches;
 use crate::mesh::TriMesh;
+use crate::scan::{Scan, read_scan};
 use crate::session::found;
 
 #[derive(Debug, Args)]
 pub(super) struct FeaturesArguments {
-    /// PLY, STL or OBJ
+    /// PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "MESH")]
     mesh: PathBuf,
     /// Unit of the coordinates in its file
@@ -63,7 +64,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
             check_kept("--touches", touches, out)?;
         }
     }
-    let MeshFile { mesh, repair } = read_mesh(&arguments.mesh, arguments.mesh_unit)?;
+    let Scan { mesh, repair, .. } = read_scan(&arguments.mesh, arguments.mesh_unit)?;
     let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
     let (table, file) = match arguments.mode {

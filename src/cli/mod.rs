@@ -35,12 +35,9 @@ mod signals;
 mod simulate;
 mod simulated_world;
 mod step;
-mod threads;
 mod told;
 #[cfg(feature = "ur")]
 mod ur;
-
-pub use threads::Threads;
 
 use error::{CliError, Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{

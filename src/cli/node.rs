@@ -10,7 +10,6 @@ use super::signals::{SignalKind, on_each_signal};
 use super::told::{ToldBy, ToldNumbers};
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
-use crate::io::mesh_file::{MeshFile, read_mesh};
 use crate::live::Quantiles;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
@@ -18,6 +17,7 @@ use crate::ros::inbox::{Inbox, inbox};
 use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::Arrival;
+use crate::scan::{Scan, read_scan};
 use crate::scene::Scene;
 
 #[derive(Debug, Args)]
@@ -78,7 +78,7 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
             let part = config.parameters.string("sim_part");
             require(!part.is_empty(), "robot:=sim needs the part that it touches: -p sim_part:=MESH")?;
             let unit = mesh_unit(&config.parameters);
-            let MeshFile { mesh, .. } = read_mesh(Path::new(part), unit).map_err(CliError::truth)?;
+            let Scan { mesh, .. } = read_scan(Path::new(part), unit).map_err(CliError::truth)?;
             ArmKind::Sim(Box::new(mesh))
         }
         "ros2_control" => ArmKind::Real(ros2_control_arm(scene, &config.beside("_driver"))?),

@@ -20,18 +20,20 @@ use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, pr
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
 use crate::io::atomic::is_same_file;
-use crate::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, check_target, read_mesh};
+use crate::io::mesh_file::{MeshFileError, MeshUnit, check_target};
 use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
+use crate::reconstruct::CloudSummary;
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
+use crate::scan::{Scan, read_scan};
 use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
-    /// The scan: PLY, STL or OBJ; not needed when the scene names its file
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
     #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = path_or_none())]
     scan: PathBuf,
     /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
@@ -111,13 +113,15 @@ reported! {
         pushes: Pushes,
         refiner: &Refiner,
         outcome: Outcome,
-        input: (ToldNumbers, Vec<InputFinding>),
+        input: (ToldNumbers, Vec<InputFinding>, Option<CloudSummary>),
         offsets: (Option<WrenchOffset>, Option<ScanOffset>)
     ) {
         /// stages built from the scene, those left out with the reason of each, and the memory at start
         scene: SceneCost = run.0,
         /// what was told of tip and scan, and by what
         told: ToldNumbers = input.0,
+        /// how the scan came of a point cloud; not there where it is a mesh
+        cloud?: CloudSummary = input.2,
         /// wrenches of the recording: each could be a sample
         samples: u64 = replayed.wrenches,
         /// those that the refiner took
@@ -257,7 +261,7 @@ impl RefineArguments {
         let (scene, told) = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
-        let MeshFile { mesh, repair } = read_mesh(&self.scan, self.mesh_unit)?;
+        let Scan { mesh, repair, cloud } = read_scan(&self.scan, self.mesh_unit)?;
         let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
         let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
@@ -350,7 +354,7 @@ impl RefineArguments {
             .clock_offset()
             .filter(|_| scene.clock.is_some())
             .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
-        let (run, input) = ((cost, [load_s, replay_s], live), (told, findings));
+        let (run, input) = ((cost, [load_s, replay_s], live), (told, findings, cloud));
         let offsets = (wrench_offset, registration);
         let summary = RefineSummary::of(run, &replayed, pushes, &ended.refiner, outcome, input, offsets);
         Ok(Refined { repair, summary, losses: replayed.losses })

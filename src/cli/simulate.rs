@@ -13,9 +13,10 @@ use super::progress::WorkProgress;
 use super::simulated_world::{OffFactor, world_named, write_told_scene, write_truth};
 use super::{CliError, Losses, check_kept, not_written, print_result, require};
 use crate::io::atomic::{create_folder, write_atomically};
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
+use crate::io::mesh_file::{MeshUnit, write_mesh};
 use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
+use crate::scan::{Scan, read_scan};
 use crate::sim::{
     CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimWorld, Stroke, StylusParams,
     Surface, Touch, plan_sides, scan, see_markers, touch,
@@ -124,7 +125,7 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         require(TIP_RADII_MM.contains(&given), why)?;
     }
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
-    let MeshFile { mesh: truth, repair } = read_mesh(&arguments.truth, arguments.mesh_unit)?;
+    let Scan { mesh: truth, repair, .. } = read_scan(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
         warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
     }

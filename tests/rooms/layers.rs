@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 const MAY_USE: &[(&str, &str)] = &[
     ("clock", ""),
     ("log_lines", ""),
+    ("threads", "mesh"),
     ("numeric", ""),
     ("parameters", ""),
     ("stylus", "numeric parameters"),
@@ -29,24 +30,25 @@ const MAY_USE: &[(&str, &str)] = &[
     ("calibrate", "numeric stylus mesh align"),
     ("diagnose", "numeric stylus mesh"),
     ("io", "parameters stylus mesh form features align arm execute"),
+    ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io"),
     (
         "report",
-        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scene session replay",
+        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",
     ),
     ("ur", "clock stylus plan arm"),
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scene session",
+         calibrate compare diagnose io scan scene session",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare \
-         diagnose io scene session replay ros ros2_control ur",
+         diagnose io threads scan scene session replay ros ros2_control ur",
     ),
 ];
 

@@ -11,7 +11,7 @@ use clap::{Parser, ValueEnum};
 
 use touchup_io::atomic::{create_folder, write_atomically};
 use touchup_io::machine::{COMMIT, VERSION, describe_machine};
-use touchup_io::mesh_file::{MeshFileError, MeshUnit, read_mesh};
+use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::{StampSource, Topics};
 use touchup_report::coverage::CoverageParams;
 use touchup_report::document::Report;
@@ -24,6 +24,7 @@ use touchup_report::{
     Chapter, Effort, TableCell, convergence, cost, coverage, extremes, mistakes, stability, verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
+use touchup_session::scan::{ScanError, read_scan};
 use touchup_session::scene::{Scene, SceneError};
 
 use crate::environment::{PeersError, peers};
@@ -36,7 +37,7 @@ pub enum CommandError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
-    ReadMesh(#[from] MeshFileError),
+    ReadMesh(#[from] ScanError),
     #[error(transparent)]
     Replay(#[from] ReplayError),
     #[error("cannot write {}: {source}", path.display())]
@@ -83,7 +84,7 @@ pub struct ReportArguments {
     /// Virtual environment for them; made where it is not there [default: peers-env in the folder of --out]
     #[arg(long, value_name = "DIR", requires = "peers")]
     peers_env: Option<PathBuf>,
-    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ
+    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
     scan: Option<PathBuf>,
     /// Its true part, in the frame of the scan
@@ -254,8 +255,8 @@ impl ReportArguments {
         })?;
         Ok(Some(GivenPart {
             name: scan.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            scan: read_mesh(scan, self.mesh_unit)?.mesh,
-            truth: read_mesh(truth, self.mesh_unit)?.mesh,
+            scan: read_scan(scan, self.mesh_unit)?.mesh,
+            truth: read_scan(truth, self.mesh_unit)?.mesh,
             samples,
             tip: params.tip,
             compensator: params.compensator,

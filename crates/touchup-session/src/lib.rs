@@ -3,6 +3,8 @@
 //! | module | what it does |
 //! |---|---|
 //! | [`clock`] | steady time, of the machine or of a test that moves it |
+//! | [`threads`] | workers for the rooms that are pure |
+//! | [`scan`] | a mesh or a point cloud of a file, as a mesh |
 //! | [`scene`] | the YAML that names the parts of a scene and their parameters |
 //! | [`live`] | the engine: the haptic update at every sample, the patch beside it or at the end |
 //! | [`replay`] | a recording from its first message to its last, as messages or as samples |
@@ -14,5 +16,7 @@ pub use touchup_io::reported;
 pub mod clock;
 pub mod live;
 pub mod replay;
+pub mod scan;
 pub mod scene;
 pub mod session;
+pub mod threads;

@@ -12,11 +12,12 @@ use crate::align::{
     Surfaces, align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, Threads, counted, print_report, reported};
+use crate::cli::{CliError, counted, print_report, reported};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
 use crate::mesh::{FaceTree, TriMesh, VertexId};
+use crate::threads::Threads;
 
 /// Points of the mesh that are brought onto the truth.
 const POINTS: f64 = 100_000.0;

@@ -10,9 +10,10 @@ use crate::calibrate::{ReferenceSphere, beside_spheres};
 use crate::cli::arm_errors::ArmErrorsName;
 use crate::cli::told::{ToldFlags, ToldNumbers};
 use crate::cli::{CliError, require};
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::mesh_file::MeshUnit;
 use crate::mesh::TriMesh;
 use crate::probing::execute::{Cell, ProbeParams, StaticWorld};
+use crate::scan::{Scan, read_scan};
 use crate::scene::{CheckStanding, Scene, simulated_arm};
 use crate::sim::ArmParams;
 
@@ -52,7 +53,7 @@ impl Ready {
     pub fn read(scene: &Path, scan: &Path, unit: MeshUnit) -> Result<Self, CliError> {
         let (scene, told) = ToldFlags::default().scene(Some(scene))?;
         let (cell, params) = scene.probing().ok_or_else(|| CliError::usage(NO_ROBOT))?;
-        let MeshFile { mesh, repair } = read_mesh(scan, unit)?;
+        let Scan { mesh, repair, .. } = read_scan(scan, unit)?;
         info!(%repair, "scan");
         let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
         Ok(Self { cell, params, scene, told, mesh, spheres: Vec::new(), check })

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crate::haptic::RefineError;
-use crate::io::mesh_file::MeshFileError;
 use crate::live::LiveError;
+use crate::scan::ScanError;
 use crate::scene::SceneError;
 use crate::session::{OutcomeError, SessionError};
 use crate::stylus::SettingError;
@@ -34,7 +34,7 @@ pub enum NodeError {
     NoRobot,
     /// The scan cannot be read.
     #[error("{0}")]
-    Scan(#[from] Box<MeshFileError>),
+    Scan(#[from] Box<ScanError>),
     /// A setting of the scene.
     #[error(transparent)]
     Setting(#[from] SettingError),

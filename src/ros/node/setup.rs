@@ -7,10 +7,11 @@ use super::error::NodeError;
 use super::replica::MeshReplica;
 use super::shared::Shared;
 use crate::clock::Clock;
-use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::Topics;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::parameters::Parameters;
+use crate::scan::read_scan;
 use crate::scene::{CutScan, RegionCut, Scene, SceneError, Setting};
 
 /// The scan as it came, and the tree over its faces.
@@ -39,7 +40,7 @@ impl Setup {
             "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
             path => (PathBuf::from(path), mesh_unit(&parameters)),
         };
-        let MeshFile { mesh, .. } = read_mesh(&scan_path, mesh_unit).map_err(Box::new)?;
+        let mesh = read_scan(&scan_path, mesh_unit).map_err(Box::new)?.mesh;
         if scene.region().is_some() && parameters.string("robot") != "none" {
             return Err(NodeError::RegionWithRobot);
         }

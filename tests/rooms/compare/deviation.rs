@@ -583,7 +583,7 @@ fn any_number_of_threads_finds_the_same_to_the_last_bit() {
     // one by one, in the order given
     let by_hand = |p| tree.closest(&mesh, p, f64::INFINITY).unwrap().distance_squared.sqrt().to_bits();
     assert!(points.iter().zip(&one).all(|(p, found)| by_hand(p) == found & (u64::MAX >> 1)));
-    for workers in [&SoMany(2) as &dyn Workers, &SoMany(3), &touchup::cli::Threads] {
+    for workers in [&SoMany(2) as &dyn Workers, &SoMany(3), &touchup::threads::Threads] {
         assert!(bits(workers) == one && register(workers) == motion && whole(workers) == all);
     }
 }

@@ -43,7 +43,7 @@ const NASTY: [(&str, Gives); 54] = {
         ("assimp_PLY_points.ply", Error("no face in it, only 4 vertices: make a triangle mesh of it first")),
         ("assimp_STL_Spider_binary.stl", Mesh(Metre, [722, 1312, 72, 6, 0])),
         ("assimp_STL_triangle_with_empty_solid.stl", Mesh(Metre, [3, 1, 3, 1, 0])),
-        ("assimp_invalid_OutOfMemory.off", Error("not a kind of mesh file known here: convert it to .ply, .stl or .obj")),
+        ("assimp_invalid_OutOfMemory.off", Error("not a kind of mesh or point cloud known here: convert it to .ply, .stl, .obj, .pcd, .xyz or .e57")),
         ("assimp_invalid_empty.obj", Error("byte 0: expected a mesh, found the end of the file")),
         ("assimp_invalid_malformed.obj", Error("line 23: a face uses vertex 12, but there are only 8 vertices")),
         ("libigl_cube_with_fold.ply", Mesh(Metre, [26, 48, 0, 0, 0])),

@@ -1,3 +1,4 @@
 mod mesh_files;
 mod pipeline;
+mod point_clouds;
 mod recordings;

@@ -16,6 +16,7 @@ use touchup::io::recording::{RecordingReader, Topics, write_recording};
 use touchup::live::{Engine, Renewal};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::PatcherParams;
+use touchup::scan::read_scan;
 use touchup::stylus::{Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
 
 use crate::common::{grid, within};
@@ -441,7 +442,7 @@ fn nasty_scans_are_refused_in_one_line_or_refined() {
             let output = refine(scan, &plate.at("touch.mcap"), &out, &flags);
             let name = scan.file_name().unwrap().to_str().unwrap();
             assert!(code(&output) != 3 || stderr(&output).contains(name), "{what}: {}", stderr(&output));
-            check_outcome(&output, &out, unit, || read_mesh(scan, unit).unwrap().mesh.face_count(), &what);
+            check_outcome(&output, &out, unit, || read_scan(scan, unit).unwrap().mesh.face_count(), &what);
             codes[code(&output) as usize] += 1;
         }
     }

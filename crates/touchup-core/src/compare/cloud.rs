@@ -1,33 +1,10 @@
 //! Distance from point to point: both shapes taken for clouds, as in the paper's Fig 20.
 
-use nabo::{KDTree, NotNan, Point};
 use nalgebra::Point3;
 
 use super::CompareError;
 use super::deviation::check_finite;
-use crate::mesh::coherent_order;
-
-/// Steps into which the larger side of the cloud is divided for the search, 1e-13 m in 100 mm: whole numbers of them can
-/// always be halved, so no two points are too near for the tree.
-const STEPS: f64 = (1u64 << 40) as f64;
-/// Points that the numbers of the tree can count, by far.
-const MOST_POINTS: usize = 1 << 28;
-
-/// A point of the tree, in steps.
-#[derive(Clone, Copy, Default)]
-struct GridPoint([NotNan<f64>; 3]);
-
-impl Point<f64> for GridPoint {
-    const DIM: u32 = 3;
-
-    fn set(&mut self, axis: u32, value: NotNan<f64>) {
-        self.0[axis as usize] = value;
-    }
-
-    fn get(&self, axis: u32) -> NotNan<f64> {
-        self.0[axis as usize]
-    }
-}
+use crate::mesh::{PointTree, coherent_order};
 
 /// Distance from each of `points` to the nearest point of `cloud`, m.
 ///
@@ -38,22 +15,18 @@ impl Point<f64> for GridPoint {
 pub fn cloud_distances(points: &[Point3<f64>], cloud: &[Point3<f64>]) -> Result<Vec<f64>, CompareError> {
     check_finite(points)?;
     check_finite(cloud)?;
-    if cloud.len() > MOST_POINTS {
-        return Err(CompareError::TooManyPoints { points: cloud.len(), most: MOST_POINTS });
+    if cloud.len() > PointTree::MOST_POINTS {
+        return Err(CompareError::TooManyPoints { points: cloud.len(), most: PointTree::MOST_POINTS });
     }
-    let first = *cloud.first().ok_or(CompareError::NoPoints)?;
-    let [lo, hi] = cloud.iter().fold([first; 2], |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
-    let steps = STEPS / (hi - lo).amax().max(f64::MIN_POSITIVE * STEPS);
-    let place = |p: &Point3<f64>| {
-        let whole = ((p - lo) * steps).map(f64::floor);
-        GridPoint([whole.x, whole.y, whole.z].map(|x| NotNan::new(x).unwrap_or_default()))
-    };
-    let tree = KDTree::new(&cloud.iter().map(place).collect::<Vec<GridPoint>>());
+    if cloud.is_empty() {
+        return Err(CompareError::NoPoints);
+    }
+    let tree = PointTree::new(cloud);
     let mut distances = vec![f64::INFINITY; points.len()];
     for at in coherent_order(points) {
         let p = &points[at as usize];
-        if let Some(nearest) = tree.knn(1, &place(p)).first() {
-            distances[at as usize] = (p - cloud[nearest.index as usize]).norm();
+        if let Some((nearest, _)) = tree.nearest(p, 1, f64::INFINITY).next() {
+            distances[at as usize] = (p - cloud[nearest]).norm();
         }
     }
     Ok(distances)

@@ -10,15 +10,19 @@
 //! squares that bound the region both sides share one *trace*: the polyline in which the scan crosses that square. [`Cut`]
 //! clips the scan and holds the traces, [`contour`] makes the new faces, [`Patch::applied_to`] puts the two together.
 //!
+//! Where the scan is a cloud of points, [`surface_of_cloud`] makes a mesh of it first.
+//!
 //! Vertices are named by [`VertexKey`], so neighbours share them without a search and no crack can arise. Each face has an
 //! [`Owner`] whose faces depend on the field, the region and the scan nearby alone.
 
+mod cloud_surface;
 mod contour;
 mod evidence;
 mod field;
 mod incremental;
 mod table;
 
+pub use cloud_surface::{CloudError, CloudSummary, CloudSurface, NormalSource, surface_of_cloud};
 pub use contour::crossing::Crossing;
 pub use contour::dual_contouring::contour;
 pub use contour::patched::{OpenSquare, Patch, Patched, Support};

@@ -38,6 +38,15 @@ pub enum Defect {
         /// how many there are
         vertices: usize,
     },
+    /// A file of points without one.
+    #[error("no point in it: export it again with x, y and z of each point")]
+    NoPoints,
+    /// What the reader of E57 files says.
+    #[error("the E57 file is damaged or of a kind not known here ({reason}): export it again")]
+    E57 {
+        /// in its own words
+        reason: String,
+    },
 }
 
 /// A [`Defect`] with its [`FilePlace`].

@@ -1,9 +1,10 @@
-//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out.
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in.
 
 mod column;
 mod defect;
 mod obj;
 mod ply;
+mod point_cloud;
 mod soup;
 mod stl;
 mod text;
@@ -19,8 +20,9 @@ use super::file_error::{FileError, read_file, write_file};
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
+use point_cloud::CloudFormat;
 use soup::Soup;
-use touchup_core::mesh::{FARTHEST, MeshError, RepairReport, TriMesh, is_place, repair};
+use touchup_core::mesh::{FARTHEST, MeshError, PointCloud, RepairReport, TriMesh, is_place, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Why a mesh file could not be read or written.
@@ -30,7 +32,7 @@ pub enum MeshFileError {
     #[error(transparent)]
     File(#[from] FileError),
     /// Neither the name nor the content is known.
-    #[error("{}: not a kind of mesh file known here: convert it to .ply, .stl or .obj", path.display())]
+    #[error("{}: not a kind of mesh or point cloud known here: convert it to .ply, .stl, .obj, .pcd, .xyz or .e57", path.display())]
     UnknownFormat {
         /// the file
         path: PathBuf,
@@ -52,6 +54,14 @@ pub enum MeshFileError {
         path: PathBuf,
         /// how many points
         vertices: usize,
+    },
+    /// E57 has a unit, and another one was named.
+    #[error("{}: an E57 file is in metres by its standard, not in {unit}: --mesh-unit m", path.display())]
+    UnitOfE57 {
+        /// the file
+        path: PathBuf,
+        /// the unit named by the user
+        unit: MeshUnit,
     },
     /// The triangles make no mesh.
     #[error("{}: {source}", path.display())]
@@ -116,6 +126,15 @@ impl Format {
     }
 }
 
+/// What a file holds.
+#[derive(Clone, Debug)]
+pub enum MeshOrPoints {
+    /// triangles, repaired
+    Mesh(Box<MeshFile>),
+    /// points alone, as they are in the file, also those without a place
+    Points(PointCloud),
+}
+
 /// Reads a PLY, STL or OBJ file and repairs it ([`repair`]).
 ///
 /// The content decides about the format where it is unmistakable, the extension otherwise.
@@ -123,29 +142,83 @@ impl Format {
 /// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
 ///
 /// # Errors
-/// [`MeshFileError`]: one line that names the file, the place in it, and what to do.
+/// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud is one.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
+    match read_mesh_or_points(path, unit)? {
+        MeshOrPoints::Mesh(file) => Ok(*file),
+        MeshOrPoints::Points(cloud) => {
+            Err(MeshFileError::NoFaces { path: path.into(), vertices: cloud.positions.len() })
+        }
+    }
+}
+
+/// [`read_mesh`], or the points of a point cloud: PLY without faces, PCD, text, E57.
+///
+/// - `unit`: the unit of the coordinates in the file; an E57 is in m.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, MeshFileError> {
     let bytes = read_file(path)?;
-    let format = Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)?;
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    if bytes.is_empty() {
+        return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
+    }
+    match cloud_format(&bytes, path) {
+        Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
+            return Err(MeshFileError::UnitOfE57 { path: path.into(), unit });
+        }
+        Some(format) => return Ok(MeshOrPoints::Points(format.read(&bytes, unit).map_err(syntax)?)),
+        None => {}
+    }
     let scale = unit.metres();
-    let soup = match format {
-        _ if bytes.is_empty() => Err(Syntax::ends(FilePlace::Byte(0), "a mesh")),
-        Format::Ply => ply::read(&bytes, scale),
+    let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok)? {
         Format::Stl => stl::read(&bytes, scale),
         Format::Obj => obj::read(&bytes, scale),
+        Format::Ply => match ply::read(&bytes, scale) {
+            Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
+                let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
+                let (positions, normals) = columns.map_err(syntax)?;
+                return Ok(MeshOrPoints::Points(point_cloud::of_ply(positions, normals)));
+            }
+            soup => soup,
+        },
     };
-    drop(bytes);
-    let Soup { positions, faces, unused } =
-        soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    let Soup { positions, faces, unused } = soup.map_err(syntax)?;
     if faces.is_empty() {
         return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
     }
-    let (mesh, mut report) =
+    let mut file = repaired(path, unit, positions, faces)?;
+    file.repair.unused_vertices += unused;
+    Ok(MeshOrPoints::Mesh(Box::new(file)))
+}
+
+/// The mesh of what `path` holds, repaired ([`repair`]).
+///
+/// - `unit`: of the file, for what is said of a size that cannot be right; `positions`: m.
+///
+/// # Errors
+/// [`MeshFileError::Mesh`], [`MeshFileError::Implausible`].
+pub fn repaired(
+    path: &Path,
+    unit: MeshUnit,
+    positions: Vec<Point3<f64>>,
+    faces: Vec<[u32; 3]>,
+) -> Result<MeshFile, MeshFileError> {
+    let (mesh, repair) =
         repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
-    report.unused_vertices += unused;
     let [low, high] = mesh.bounds();
     Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
-    Ok(MeshFile { mesh, repair: report })
+    Ok(MeshFile { mesh, repair })
+}
+
+/// The format of a file that holds nothing but points.
+fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
+    let of_name = || CloudFormat::of_extension(path.extension()?.to_ascii_lowercase().to_str()?);
+    match Format::of_content(bytes) {
+        Some(_) => None,
+        None => CloudFormat::of_content(bytes).or_else(of_name),
+    }
 }
 
 /// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each vertex of the `mesh` that
@@ -169,6 +242,10 @@ pub fn read_vertex_columns<const N: usize>(
     let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
     let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
     let rows = rows_of(mesh, &positions);
+    // of a surface made through points no vertex is in the file
+    if rows.len() < mesh.positions().len() {
+        return Ok([const { None }; N]);
+    }
     Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
 }
 

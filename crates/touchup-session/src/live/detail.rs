@@ -21,7 +21,7 @@ pub(super) struct Detail {
 /// Where the scan is.
 #[derive(Debug)]
 enum OriginalScan {
-    Own(TriMesh),
+    Own(Box<TriMesh>),
     Shared(Arc<(TriMesh, FaceTree)>),
 }
 
@@ -47,7 +47,7 @@ impl Detail {
         }
         let scan = match shared {
             Some(shared) => OriginalScan::Shared(Arc::clone(shared)),
-            None => OriginalScan::Own(scan),
+            None => OriginalScan::Own(Box::new(scan)),
         };
         Ok((working, Some(Self { scan, simplified, shown: None, rests: 0 })))
     }

@@ -172,7 +172,7 @@ parameters! {
     /// `scan`
     #[derive(Clone, Debug, PartialEq)]
     pub struct ScanSection in "scan" {
-        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, relative to the folder of this scene.
+        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, or a point cloud (PLY, PCD, XYZ or E57), relative to the folder of this scene.
         file: Option<PathBuf> = None, "file" like "scan.ply";
         /// Unit of the coordinates in that file.
         unit: MeshUnit = MeshUnit::Millimetre, "unit";

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use touchup_core::mesh::{FaceId, MeshError, TriMesh, VertexId};
 use touchup_core::reconstruct::{Owner, PatchDelta, Support, VertexKey};
 
-use super::{FaceShown, Scans, Shown, VERTICES_OF_A_CHANGE, remove_from, return_to};
+use super::followed::{FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remove_from, return_to};
 
 /// The patch of all touches, as far as it is shown.
 #[derive(Debug, Default)]
@@ -80,29 +80,26 @@ impl AtRest {
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
         self.support.get(&vertex).copied()
     }
-}
 
-impl Shown {
     /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
-    pub fn rest(&mut self, patch: PatchDelta, working: &TriMesh) {
-        let AtRest { phase, patch: shown, edits, wanted, .. } = &mut self.at_rest;
+    pub fn want(&mut self, patch: PatchDelta, working: &TriMesh) {
+        let Self { phase, patch: shown, edits, wanted, .. } = self;
         let is_same = shown.vertices == patch.vertices && shown.owners == patch.owners && shown.faces == patch.faces;
         let is_shown = is_same && *phase == Phase::Resting && *edits == working.edits();
         *wanted = (!is_shown).then_some(patch);
     }
 
-    /// Whether the patch of all touches is shown, or about to be, as [`Self::follow`] goes on.
-    pub fn rests(&self, working: &TriMesh) -> bool {
-        let AtRest { phase, wanted, edits, .. } = &self.at_rest;
-        wanted.is_some() || *phase == Phase::Resting && *edits == working.edits()
+    /// Whether the patch of all touches is shown, or about to be.
+    pub fn is_wanted(&self, working: &TriMesh) -> bool {
+        self.wanted.is_some() || self.phase == Phase::Resting && self.edits == working.edits()
     }
 
     /// Where the patch of all touches is wanted, begins with it; returns whether there is anything to do for it.
-    pub(super) fn begin_to_rest(&mut self, scans: Scans<'_>, working: &TriMesh) -> bool {
-        let Some(patch) = self.at_rest.wanted.take() else { return false };
-        let slots = || (0..self.shown.len() as u32).map(FaceId);
-        let mut is_hidden: Vec<bool> = vec![true; self.parts.len()];
-        for shown in &self.shown {
+    pub fn begin(&mut self, followed: &FollowedScan, scans: Scans<'_>, working: &TriMesh) -> bool {
+        let Some(patch) = self.wanted.take() else { return false };
+        let slots = || (0..followed.shown.len() as u32).map(FaceId);
+        let mut is_hidden: Vec<bool> = vec![true; followed.parts.len()];
+        for shown in &followed.shown {
             if let FaceShown::Detail(detail) = shown {
                 is_hidden[detail.0 as usize] = false;
             }
@@ -110,13 +107,15 @@ impl Shown {
         let details = scans.simplified.mesh.faces().map(|(detail, _)| detail);
         let hidden = details.filter(|detail| is_hidden[detail.0 as usize]);
         let mut steps: Vec<Step> = Vec::new();
-        steps.extend(slots().filter(|face| matches!(self.shown[face.0 as usize], FaceShown::Same(_))).map(Step::Park));
+        steps.extend(
+            slots().filter(|face| matches!(followed.shown[face.0 as usize], FaceShown::Same(_))).map(Step::Park),
+        );
         steps.extend(hidden.map(Step::BringBack));
         // in an order that does not hang on the table
-        let mut moved: Vec<u32> = self.moved.iter().copied().collect();
+        let mut moved: Vec<u32> = followed.moved.iter().copied().collect();
         moved.sort_unstable();
         steps.extend(moved.into_iter().map(Step::PutBack));
-        let added = (0..self.added.len() as u32).filter(|&at| self.added[at as usize].is_some());
+        let added = (0..followed.added.len() as u32).filter(|&at| followed.added[at as usize].is_some());
         steps.extend(added.map(|at| Step::Forget(VertexId(at))));
         steps.extend((0..patch.vertices.len() as u32).map(Step::Place));
         steps.extend(patch.owners.iter().filter_map(|(owner, _)| match owner {
@@ -125,32 +124,34 @@ impl Shown {
         }));
         steps.extend((0..patch.faces.len() as u32).map(Step::Fill));
         steps.reverse();
-        let at_rest = &mut self.at_rest;
-        (at_rest.phase, at_rest.steps, at_rest.edits) = (Phase::Resting, steps, working.edits());
-        at_rest.patch = patch;
-        at_rest.placed.clear();
+        (self.phase, self.steps, self.edits) = (Phase::Resting, steps, working.edits());
+        self.patch = patch;
+        self.placed.clear();
         true
     }
 
     /// Goes on from the working mesh to the patch of all touches or back, by up to `most` steps; returns whether that was all.
-    pub(super) fn go_on_resting(
+    ///
+    /// # Errors
+    /// [`MeshError::TooMany`].
+    pub fn go_on(
         &mut self,
+        followed: &mut FollowedScan,
         scans: Scans<'_>,
         working: &TriMesh,
         most: usize,
     ) -> Result<bool, MeshError> {
         let mut left = most;
         while left > 0 {
-            let Some(step) = self.at_rest.steps.pop() else {
-                let at_rest = &mut self.at_rest;
-                let has_changed = working.edits() != at_rest.edits || at_rest.wanted.is_some();
-                at_rest.phase = match at_rest.phase {
+            let Some(step) = self.steps.pop() else {
+                let has_changed = working.edits() != self.edits || self.wanted.is_some();
+                self.phase = match self.phase {
                     Phase::Resting if has_changed => {
-                        at_rest.steps = std::mem::take(&mut at_rest.back);
+                        self.steps = std::mem::take(&mut self.back);
                         Phase::Leaving
                     }
                     Phase::Leaving => {
-                        (at_rest.patch, at_rest.placed, at_rest.support) = Default::default();
+                        (self.patch, self.placed, self.support) = Default::default();
                         Phase::Following
                     }
                     phase => return Ok(phase != Phase::Leaving),
@@ -158,95 +159,101 @@ impl Shown {
                 continue;
             };
             left = left.saturating_sub(match step {
-                Step::BringBack(detail) | Step::Hide(detail) => self.parts[detail.0 as usize].len().max(1),
-                Step::PutBack(cell) => self.vertices.of(cell).len().div_ceil(VERTICES_OF_A_CHANGE).max(1),
+                Step::BringBack(detail) | Step::Hide(detail) => followed.parts[detail.0 as usize].len().max(1),
+                Step::PutBack(cell) => followed.vertices.of(cell).len().div_ceil(VERTICES_OF_A_CHANGE).max(1),
                 _ => 1,
             });
-            self.take_step(step, scans, working)?;
+            self.take_step(step, followed, scans, working)?;
         }
         Ok(false)
     }
 
     /// Takes a step, and notes the one that takes it back.
-    fn take_step(&mut self, step: Step, scans: Scans<'_>, working: &TriMesh) -> Result<(), MeshError> {
+    fn take_step(
+        &mut self,
+        step: Step,
+        followed: &mut FollowedScan,
+        scans: Scans<'_>,
+        working: &TriMesh,
+    ) -> Result<(), MeshError> {
         let back = match step {
             Step::Park(face) => {
-                let shown = std::mem::replace(&mut self.shown[face.0 as usize], FaceShown::Gone);
+                let shown = std::mem::replace(&mut followed.shown[face.0 as usize], FaceShown::Gone);
                 if let FaceShown::Same(same) = shown {
-                    self.mesh.remove_face(same);
+                    followed.mesh.remove_face(same);
                 }
                 Step::Follow(face)
             }
             Step::BringBack(detail) => {
-                self.bring_back(scans, detail)?;
+                followed.bring_back(scans, detail)?;
                 Step::Hide(detail)
             }
             Step::PutBack(cell) => {
-                for &vertex in self.vertices.of(cell) {
+                for &vertex in followed.vertices.of(cell) {
                     let (vertex, place) = (VertexId(vertex), scans.original.position(VertexId(vertex)));
-                    if self.mesh.position(vertex) != place {
-                        self.mesh.set_position(vertex, place);
+                    if followed.mesh.position(vertex) != place {
+                        followed.mesh.set_position(vertex, place);
                     }
                 }
-                self.moved.remove(&cell);
+                followed.moved.remove(&cell);
                 Step::Carry(cell)
             }
             Step::Forget(vertex) => {
-                self.remove(vertex);
+                followed.remove(vertex);
                 return Ok(());
             }
             Step::Place(at) => {
-                let vertex = self.at_rest.patch.vertices[at as usize];
+                let vertex = self.patch.vertices[at as usize];
                 if let VertexKey::Scan(moved) = vertex.key {
-                    self.at_rest.placed.push(moved);
+                    self.placed.push(moved);
                     if vertex.support != Support::Scan {
-                        self.at_rest.support.insert(moved, vertex.support);
+                        self.support.insert(moved, vertex.support);
                     }
-                    if self.mesh.position(moved) == vertex.position {
+                    if followed.mesh.position(moved) == vertex.position {
                         return Ok(());
                     }
-                    self.mesh.set_position(moved, vertex.position);
-                    self.at_rest.back.push(Step::Return(moved));
-                    return Ok(());
+                    followed.mesh.set_position(moved, vertex.position);
+                    Step::Return(moved)
+                } else {
+                    let placed = followed.mesh.add_vertex(vertex.position)?;
+                    self.placed.push(placed);
+                    self.support.insert(placed, vertex.support);
+                    Step::Unplace(placed)
                 }
-                let placed = self.mesh.add_vertex(vertex.position)?;
-                self.at_rest.placed.push(placed);
-                self.at_rest.support.insert(placed, vertex.support);
-                Step::Unplace(placed)
             }
             Step::Cut(face) => {
-                remove_from(&mut self.mesh, &mut self.returned, face);
+                remove_from(&mut followed.mesh, &mut followed.returned, face);
                 Step::Restore(face)
             }
             Step::Fill(face) => {
-                let AtRest { patch, placed, .. } = &self.at_rest;
+                let Self { patch, placed, .. } = &*self;
                 let corners = patch.faces[face as usize].map(|corner| placed[corner as usize]);
-                Step::Empty(self.mesh.add_face(corners)?)
+                Step::Empty(followed.mesh.add_face(corners)?)
             }
-            Step::Follow(face) => return self.follow_face(scans, working, face),
+            Step::Follow(face) => return followed.follow_face(scans, working, face),
             Step::Hide(detail) => {
-                self.hide(scans, detail);
+                followed.hide(scans, detail);
                 return Ok(());
             }
             Step::Carry(cell) => {
-                self.moving.insert(cell);
+                followed.moving.insert(cell);
                 return Ok(());
             }
             Step::Return(vertex) => {
-                self.mesh.set_position(vertex, scans.original.position(vertex));
+                followed.mesh.set_position(vertex, scans.original.position(vertex));
                 return Ok(());
             }
             Step::Unplace(vertex) => {
-                self.mesh.remove_vertex(vertex);
+                followed.mesh.remove_vertex(vertex);
                 return Ok(());
             }
-            Step::Restore(face) => return return_to(&mut self.mesh, &mut self.returned, scans.original, face),
+            Step::Restore(face) => return return_to(&mut followed.mesh, &mut followed.returned, scans.original, face),
             Step::Empty(face) => {
-                self.mesh.remove_face(face);
+                followed.mesh.remove_face(face);
                 return Ok(());
             }
         };
-        self.at_rest.back.push(back);
+        self.back.push(back);
         Ok(())
     }
 }

@@ -2,97 +2,32 @@
 //! moved along with the simplified ones, and the faces of the patch. At rest it is the scan with the patch of all touches.
 
 mod at_rest;
+mod followed;
 mod groups;
 
-use std::collections::{HashMap, HashSet};
-
 use at_rest::AtRest;
-use groups::Groups;
+use followed::FollowedScan;
+pub(in crate::live) use followed::Scans;
 use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle};
-use touchup_core::reconstruct::Support;
+use touchup_core::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
+use touchup_core::reconstruct::{PatchDelta, Support};
 
-/// Vertices of the scan that are moved for one change of a vertex of the working mesh, about.
-const VERTICES_OF_A_CHANGE: usize = 8;
-
-/// What a face of the working mesh is shown as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum FaceShown {
-    /// not there
-    Gone,
-    /// one of the simplified scan: by the faces of the scan that it stands for
-    Detail(FaceId),
-    /// by a face of its own
-    Same(FaceId),
-}
-
-/// The shown mesh, and how it follows the working mesh.
+/// The shown mesh.
 #[derive(Debug)]
 pub(super) struct Shown {
-    mesh: TriMesh,
-    /// vertices and faces of the scan by the cell that they (or their first corners) are in
-    vertices: Groups,
-    faces: Groups,
-    /// faces of the scan that each face of the simplified scan stands for, once its cells are parted
-    parts: Vec<Vec<FaceId>>,
-    is_parted: Vec<bool>,
-    /// by face slot of the working mesh
-    shown: Vec<FaceShown>,
-    /// where faces of the scan are that were gone and came back
-    returned: HashMap<FaceId, FaceId>,
-    /// vertices of the shown mesh that are not of the scan, by vertex slot of the working mesh …
-    added: Vec<Option<VertexId>>,
-    /// … and the other way
-    working: HashMap<VertexId, VertexId>,
-    /// removed from the working mesh, while faces that are to follow still use them
-    leaving: Vec<VertexId>,
-    /// cells whose vertices are to be moved …
-    moving: IdSet,
-    /// … and those whose vertices are not all where the scan has them
-    moved: HashSet<u32>,
+    followed: FollowedScan,
     at_rest: AtRest,
-    changes: Changes,
-}
-
-/// The scan, and what stands for it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Scans<'a> {
-    pub original: &'a TriMesh,
-    pub simplified: &'a Simplified,
 }
 
 impl Shown {
     /// The scan as it is.
-    pub fn new(Scans { original, simplified }: Scans<'_>) -> Self {
-        let (mut mesh, working) = (original.clone(), &simplified.mesh);
-        mesh.watch();
-        let cells = working.vertex_slots();
-        let cell_of = |vertex: VertexId| simplified.cell_of(vertex).map(|cell| cell.0);
-        let vertices = Groups::new(cells, original.vertex_slots(), |vertex| cell_of(VertexId(vertex)));
-        let faces = Groups::new(cells, original.face_slots(), |face| {
-            original.has_face(FaceId(face)).then(|| cell_of(original.corners(FaceId(face))[0])).flatten()
-        });
-        Self {
-            vertices,
-            faces,
-            parts: vec![Vec::new(); working.face_slots()],
-            is_parted: vec![false; cells],
-            shown: (0..working.face_slots() as u32).map(|face| FaceShown::Detail(FaceId(face))).collect(),
-            returned: HashMap::new(),
-            added: vec![None; cells],
-            working: HashMap::new(),
-            leaving: Vec::new(),
-            moving: IdSet::default(),
-            moved: HashSet::new(),
-            at_rest: AtRest::default(),
-            changes: Changes::default(),
-            mesh,
-        }
+    pub fn new(scans: Scans<'_>) -> Self {
+        Self { followed: FollowedScan::new(scans), at_rest: AtRest::default() }
     }
 
     /// The mesh as far as it has followed.
     pub fn mesh(&self) -> &TriMesh {
-        &self.mesh
+        &self.followed.mesh
     }
 
     /// Takes up to `most` changes of each kind of the working mesh over, or where it rests of the patch of all touches; returns whether
@@ -101,218 +36,39 @@ impl Shown {
     /// # Errors
     /// [`MeshError::TooMany`].
     pub fn follow(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
-        if !self.go_on_resting(scans, refiner.mesh(), most)? {
+        let Self { followed, at_rest } = self;
+        if !at_rest.go_on(followed, scans, refiner.mesh(), most)? {
             return Ok(false);
         }
-        if self.at_rest.is_there() {
+        if at_rest.is_there() {
             return Ok(true);
         }
-        let has_followed = self.follow_working(scans, refiner, most)?;
-        Ok(has_followed && !self.begin_to_rest(scans, refiner.mesh()))
-    }
-
-    fn follow_working(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
-        let mut changes = std::mem::take(&mut self.changes);
-        changes.clear();
-        let is_all = refiner.take_changes(most, &mut changes);
-        let working = refiner.mesh();
-        for &face in &changes.faces {
-            self.follow_face(scans, working, face)?;
-        }
-        for &vertex in &changes.vertices {
-            self.follow_vertex(scans, working, vertex);
-        }
-        let mut leaving = std::mem::take(&mut self.leaving);
-        leaving.retain(|&vertex| !working.has_vertex(vertex) && !self.remove(vertex));
-        self.leaving = leaving;
-        self.changes = changes;
-        self.carry(scans, working, most * VERTICES_OF_A_CHANGE);
-        Ok(is_all && self.moving.is_empty())
+        let has_followed = followed.follow(scans, refiner, most)?;
+        Ok(has_followed && !at_rest.begin(followed, scans, refiner.mesh()))
     }
 
     /// Changes of the shown mesh, as [`TriMesh::take_changes`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
-        self.mesh.take_changes(most, into)
+        self.followed.mesh.take_changes(most, into)
     }
 
-    /// The support of a vertex of the patch, by what it follows; `None`: it is one of the scan.
+    /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
+    pub fn rest(&mut self, patch: PatchDelta, working: &TriMesh) {
+        self.at_rest.want(patch, working);
+    }
+
+    /// Whether the patch of all touches is shown, or about to be, as [`Self::follow`] goes on.
+    pub fn rests(&self, working: &TriMesh) -> bool {
+        self.at_rest.is_wanted(working)
+    }
+
+    /// The support of a vertex of the patch, by what is shown; `None`: it is one of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
-        self.at_rest.support(vertex).or_else(|| refiner.support(*self.working.get(&vertex)?))
+        self.at_rest.support(vertex).or_else(|| self.followed.support(refiner, vertex))
     }
 
     /// A face that shows a face of the working mesh.
     pub fn face(&self, scans: Scans<'_>, working: FaceId) -> Option<FaceId> {
-        match *self.shown.get(working.0 as usize)? {
-            FaceShown::Gone => None,
-            FaceShown::Same(face) => Some(face),
-            FaceShown::Detail(face) => {
-                let [corner, ..] = scans.simplified.mesh.corners(face);
-                let mut faces = self.faces.of(corner.0).iter().map(|&face| self.current(FaceId(face)));
-                faces.find(|&face| self.mesh.has_face(face))
-            }
-        }
+        self.followed.face(scans, working)
     }
-
-    fn current(&self, face: FaceId) -> FaceId {
-        self.returned.get(&face).copied().unwrap_or(face)
-    }
-
-    fn follow_face(&mut self, scans: Scans<'_>, working: &TriMesh, face: FaceId) -> Result<(), MeshError> {
-        let at = face.0 as usize;
-        if at >= self.shown.len() {
-            self.shown.resize(at + 1, FaceShown::Gone);
-        }
-        let corners = working.has_face(face).then(|| working.corners(face));
-        let detail = corners.as_ref().and_then(|corners| detail_of(&scans.simplified.mesh, corners));
-        if detail.is_some_and(|detail| self.shown[at] == FaceShown::Detail(detail)) {
-            return Ok(());
-        }
-        match std::mem::replace(&mut self.shown[at], FaceShown::Gone) {
-            FaceShown::Gone => {}
-            FaceShown::Detail(detail) => self.hide(scans, detail),
-            FaceShown::Same(same) => drop(self.mesh.remove_face(same)),
-        }
-        self.shown[at] = match (corners, detail) {
-            (None, _) => FaceShown::Gone,
-            (_, Some(detail)) => {
-                self.bring_back(scans, detail)?;
-                FaceShown::Detail(detail)
-            }
-            (Some(corners), None) => {
-                let mut ours = corners;
-                for (ours, corner) in ours.iter_mut().zip(corners) {
-                    *ours = self.add(working, corner)?;
-                }
-                FaceShown::Same(self.mesh.add_face(ours)?)
-            }
-        };
-        Ok(())
-    }
-
-    fn follow_vertex(&mut self, scans: Scans<'_>, working: &TriMesh, vertex: VertexId) {
-        if let Some(Some(added)) = self.added.get(vertex.0 as usize).copied() {
-            if working.has_vertex(vertex) {
-                self.mesh.set_position(added, working.position(vertex));
-            } else if !self.remove(vertex) {
-                self.leaving.push(vertex);
-            }
-        }
-        let simplified = &scans.simplified.mesh;
-        if (vertex.0 as usize) < simplified.vertex_slots() {
-            let around = simplified.star(vertex).iter().flat_map(|&face| simplified.corners(face));
-            around.for_each(|corner| self.moving.insert(corner.0));
-        }
-    }
-
-    /// The vertex that shows one of the working mesh for which the scan has none.
-    fn add(&mut self, working: &TriMesh, vertex: VertexId) -> Result<VertexId, MeshError> {
-        let at = vertex.0 as usize;
-        if at >= self.added.len() {
-            self.added.resize(at + 1, None);
-        }
-        if let Some(added) = self.added[at] {
-            return Ok(added);
-        }
-        let added = self.mesh.add_vertex(working.position(vertex))?;
-        self.added[at] = Some(added);
-        self.working.insert(added, vertex);
-        Ok(added)
-    }
-
-    /// Removes what shows a vertex that is gone; whether no face uses it any more.
-    fn remove(&mut self, vertex: VertexId) -> bool {
-        let Some(added) = self.added[vertex.0 as usize] else { return true };
-        let is_removed = self.mesh.remove_vertex(added);
-        if is_removed {
-            self.added[vertex.0 as usize] = None;
-            self.working.remove(&added);
-        }
-        is_removed
-    }
-
-    fn hide(&mut self, scans: Scans<'_>, detail: FaceId) {
-        self.part(scans, detail);
-        for &face in &self.parts[detail.0 as usize] {
-            remove_from(&mut self.mesh, &mut self.returned, face);
-        }
-    }
-
-    fn bring_back(&mut self, scans: Scans<'_>, detail: FaceId) -> Result<(), MeshError> {
-        self.part(scans, detail);
-        for &face in &self.parts[detail.0 as usize] {
-            return_to(&mut self.mesh, &mut self.returned, scans.original, face)?;
-        }
-        Ok(())
-    }
-
-    /// Finds the faces of the scan that the faces around the corners of `detail` stand for: each is given to the nearest.
-    fn part(&mut self, scans: Scans<'_>, detail: FaceId) {
-        let (scan, simplified) = (scans.original, &scans.simplified.mesh);
-        for cell in simplified.corners(detail) {
-            if std::mem::replace(&mut self.is_parted[cell.0 as usize], true) {
-                continue;
-            }
-            for &face in self.faces.of(cell.0) {
-                let middle = scan.barycentre(FaceId(face));
-                let off = |near: FaceId| {
-                    let (point, _) = triangle::closest_point(&middle, &simplified.triangle(near));
-                    (middle - point).norm_squared()
-                };
-                let near = simplified.star(cell).iter().map(|&near| (off(near), near));
-                if let Some((_, near)) = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) {
-                    self.parts[near.0 as usize].push(FaceId(face));
-                }
-            }
-        }
-    }
-
-    /// Moves the vertices of cells whose surroundings have moved, about `most` of them.
-    fn carry(&mut self, scans: Scans<'_>, working: &TriMesh, most: usize) {
-        let mut left = most;
-        while left > 0 && !self.moving.is_empty() {
-            let mut cell = 0;
-            self.moving.take(1, |id| cell = id);
-            let vertices = self.vertices.of(cell);
-            left = left.saturating_sub(vertices.len().max(1));
-            self.moved.insert(cell);
-            let mesh = &mut self.mesh;
-            let members = vertices.iter().map(|&vertex| VertexId(vertex));
-            scans.simplified.carry_cell(VertexId(cell), members, scans.original, working, |vertex, place| {
-                if mesh.position(vertex) != place {
-                    mesh.set_position(vertex, place);
-                }
-            });
-        }
-    }
-}
-
-/// Removes a face of the scan from the shown mesh.
-fn remove_from(mesh: &mut TriMesh, returned: &mut HashMap<FaceId, FaceId>, face: FaceId) {
-    mesh.remove_face(returned.remove(&face).unwrap_or(face));
-}
-
-/// Puts a face of the scan back that was removed.
-fn return_to(
-    mesh: &mut TriMesh,
-    returned: &mut HashMap<FaceId, FaceId>,
-    scan: &TriMesh,
-    face: FaceId,
-) -> Result<(), MeshError> {
-    let current = mesh.add_face(scan.corners(face))?;
-    if current != face {
-        returned.insert(face, current);
-    }
-    Ok(())
-}
-
-/// The face of the simplified scan with these corners, if there is one.
-fn detail_of(simplified: &TriMesh, corners: &[VertexId; 3]) -> Option<FaceId> {
-    if !simplified.has_vertex(corners[0]) {
-        return None;
-    }
-    let is_same = |face: &&FaceId| {
-        let [a, b, c] = simplified.corners(**face);
-        [[a, b, c], [b, c, a], [c, a, b]].contains(corners)
-    };
-    simplified.star(corners[0]).iter().find(is_same).copied()
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, available_parallelism, scope};
 
-use crate::mesh::{Job, Workers};
+use touchup_core::mesh::{Job, Workers};
 
 /// As many as the machine runs at the same time.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,0 +1,193 @@
+//! Normals of the points: a plane through the neighbours of each, turned to the outside.
+
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
+
+use super::clean::UsablePoints;
+use super::summary::NormalSource;
+use crate::mesh::{PointTree, Workers, map_by};
+
+/// Neighbours that a plane is laid through: two rings about a point, and enough that noise of one spacing turns it by a tenth alone.
+const PLANE: u32 = 24;
+/// Neighbours along which the normals are turned.
+const TURNED: usize = 8;
+/// The neighbour by which the spacing is measured …
+const RING: usize = 6;
+/// … whose distance on an even surface is this many spacings: the circle of that radius, √(6/π), holds six points.
+const RING_SPACINGS: f64 = 1.382;
+
+/// What the neighbours of a point say of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbourhood {
+    /// unit, of either sign
+    pub normal: Vector3<f64>,
+    /// distance of neighbouring points, m
+    pub spacing: f64,
+    /// standard deviation of the neighbours from their plane, m
+    pub noise: f64,
+    /// the nearest others
+    pub nearest: [u32; TURNED],
+}
+
+impl Neighbourhood {
+    /// Of every point.
+    ///
+    /// - `positions`: more than [`PLANE`].
+    pub fn of_all(positions: &[Point3<f64>], tree: &PointTree, workers: &dyn Workers) -> Vec<Self> {
+        map_by(workers, positions.len(), |at| Self::of(at, positions, tree))
+    }
+
+    fn of(own: usize, positions: &[Point3<f64>], tree: &PointTree) -> Self {
+        let p = &positions[own];
+        let near: Vec<_> = tree.nearest(p, PLANE + 1, f64::INFINITY).collect();
+        let ring = near.get(RING).or(near.last()).map_or(0.0, |(_, distance)| *distance);
+        let count = near.len() as f64;
+        let offset = |at: usize| positions[at] - p;
+        let mean = near.iter().map(|(at, _)| offset(*at)).sum::<Vector3<f64>>() / count;
+        let covariance = near.iter().fold(Matrix3::zeros(), |sum, (at, _)| {
+            let from_mean = offset(*at) - mean;
+            sum + from_mean * from_mean.transpose()
+        });
+        // scaled, so that squares of the smallest lengths are numbers still
+        let largest = covariance.amax().max(f64::MIN_POSITIVE);
+        let planes = (covariance / largest).symmetric_eigen();
+        let thinnest = planes.eigenvalues.imin();
+        let normal = Unit::try_new(planes.eigenvectors.column(thinnest).into_owned(), 0.0);
+        // three numbers of the plane are fitted
+        let noise = (planes.eigenvalues[thinnest].max(0.0) * largest / (count - 3.0).max(1.0)).sqrt();
+        let normal = normal.map_or(Vector3::z(), Unit::into_inner);
+        let mut others = near.iter().map(|(at, _)| *at).filter(|at| *at != own);
+        let nearest = std::array::from_fn(|_| others.next().unwrap_or(own) as u32);
+        Self { normal, spacing: ring / RING_SPACINGS, noise, nearest }
+    }
+}
+
+/// A unit normal of each point that points outside, and what says so.
+pub(super) fn oriented(points: &UsablePoints, near: &[Neighbourhood]) -> (Vec<Vector3<f64>>, NormalSource) {
+    let given: Vec<_> = points.normals.iter().map_while(|n| n.try_normalize(0.0).filter(is_finite)).collect();
+    if given.len() == points.positions.len() {
+        return (given, NormalSource::File);
+    }
+    let mut normals: Vec<_> = near.iter().map(|near| near.normal).collect();
+    if points.stations.iter().all(|station| station.eye.is_some() && station.is_sure) {
+        for (at, (normal, p)) in normals.iter_mut().zip(&points.positions).enumerate() {
+            if points.eye(at).is_some_and(|eye| normal.dot(&(eye - p)) < 0.0) {
+                normal.neg_mut();
+            }
+        }
+        return (normals, NormalSource::Scanner);
+    }
+    turn_along_tree(points, near, &mut normals);
+    (normals, NormalSource::SpanningTree)
+}
+
+fn is_finite(v: &Vector3<f64>) -> bool {
+    v.iter().all(|x| x.is_finite())
+}
+
+/// Turns the normals so that neighbours agree, along a minimum spanning tree of the neighbours whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and
+/// all of a piece that hangs together so that most look at the scanner or, where it is not known, out of the piece.
+fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut [Vector3<f64>]) {
+    let mut pairs: Vec<(u32, [u32; 2])> = Vec::with_capacity(near.len() * TURNED);
+    for (at, found) in (0u32..).zip(near) {
+        for other in found.nearest {
+            // where each is a neighbour of the other, once
+            if at < other || !near[other as usize].nearest.contains(&at) {
+                let cost = (1.0 - normals[at as usize].dot(&normals[other as usize]).abs()).max(0.0);
+                pairs.push(((cost * COST_STEPS) as u32, [at, other]));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    let mut sides = Sides::of(near.len());
+    for (_, pair) in pairs {
+        let [a, b] = pair.map(|at| normals[at as usize]);
+        sides.join(pair, a.dot(&b) < 0.0);
+    }
+    let mut pieces = vec![Vec::new(); near.len()];
+    for (at, normal) in normals.iter_mut().enumerate() {
+        let (root, is_opposite) = sides.root(at as u32);
+        if is_opposite {
+            normal.neg_mut();
+        }
+        pieces[root as usize].push(at);
+    }
+    for piece in pieces.iter().filter(|piece| !piece.is_empty()) {
+        if !looks_outside(piece, points, normals) {
+            piece.iter().for_each(|&at| normals[at].neg_mut());
+        }
+    }
+}
+
+/// Costs are compared as whole numbers, so that their order is the same everywhere.
+const COST_STEPS: f64 = 1e9;
+
+/// Disjoint sets of points, and for each whether it is to be turned against the one that names its set.
+struct Sides(Vec<(u32, bool)>);
+
+impl Sides {
+    fn of(count: usize) -> Self {
+        Self((0..count as u32).map(|at| (at, false)).collect())
+    }
+
+    /// What names the set of `at`, and whether `at` is turned against it; halves the path as it goes.
+    fn root(&mut self, mut at: u32) -> (u32, bool) {
+        let mut is_opposite = false;
+        loop {
+            let (above, against) = self.0[at as usize];
+            if above == at {
+                return (at, is_opposite);
+            }
+            let (next, against_next) = self.0[above as usize];
+            self.0[at as usize] = (next, against ^ against_next);
+            is_opposite ^= against ^ against_next;
+            at = next;
+        }
+    }
+
+    /// Makes one set of two, where they are not one yet.
+    fn join(&mut self, pair: [u32; 2], is_opposite: bool) {
+        let [(a, of_a), (b, of_b)] = pair.map(|at| self.root(at));
+        if a != b {
+            self.0[a.max(b) as usize] = (a.min(b), is_opposite ^ of_a ^ of_b);
+        }
+    }
+}
+
+/// Whether the normals of a piece look more to the scanner than away, or out of the piece: their flux through a closed surface is thrice
+/// its volume.
+fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>]) -> bool {
+    let positions = &points.positions;
+    let vote = |&at: &usize| Some(normals[at].dot(&(points.eye(at)? - positions[at])).signum());
+    let votes: f64 = piece.iter().filter_map(vote).sum();
+    if votes != 0.0 {
+        return votes > 0.0;
+    }
+    let middle = piece.iter().map(|&at| positions[at].coords).sum::<Vector3<f64>>() / piece.len() as f64;
+    let [flux, reach] = piece.iter().fold([0.0; 2], |[flux, reach], &at| {
+        let from_middle = positions[at].coords - middle;
+        [flux + normals[at].dot(&from_middle), reach + from_middle.norm()]
+    });
+    /// Of a flat piece there is no flux but that of noise; then up is outside, as of a part on a table.
+    const FLAT: f64 = 0.02;
+    if flux.abs() > FLAT * reach {
+        return flux > 0.0;
+    }
+    let sum: Vector3<f64> = piece.iter().map(|&at| normals[at]).sum();
+    sum[sum.iamax()] >= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_follow_every_chain_of_pairs() {
+        // 0 ≠ 1 ≠ 2 = 3, and 4 = 5; the last pair closes a circle and says nothing
+        let mut sides = Sides::of(6);
+        for (pair, is_opposite) in [([2, 3], false), ([0, 1], true), ([5, 4], false), ([2, 1], true), ([3, 0], true)] {
+            sides.join(pair, is_opposite);
+        }
+        let found: Vec<_> = (0..6).map(|at| sides.root(at)).collect();
+        assert_eq!(found, [(0, false), (0, true), (0, false), (0, false), (4, false), (4, false)]);
+    }
+}

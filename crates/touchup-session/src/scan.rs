@@ -1,0 +1,58 @@
+//! A scan as it comes: a mesh, or points through which a surface is made.
+
+use std::path::{Path, PathBuf};
+
+use touchup_core::mesh::{RepairReport, TriMesh};
+use touchup_core::reconstruct::{CloudError, CloudSummary, CloudSurface, surface_of_cloud};
+use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshOrPoints, MeshUnit, read_mesh_or_points, repaired};
+
+use crate::threads::Threads;
+
+/// Why there is no mesh of a scan.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanError {
+    /// The file cannot be read, or what is in it is no mesh.
+    #[error(transparent)]
+    File(#[from] MeshFileError),
+    /// Its points make no surface.
+    #[error("{}: {source}", path.display())]
+    Cloud {
+        /// the file
+        path: PathBuf,
+        /// why, and what to do
+        source: CloudError,
+    },
+}
+
+/// A scan as a mesh.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    /// vertices in m, in the file's own frame, which becomes O
+    pub mesh: TriMesh,
+    /// defects of the file, or of the surface that was made
+    pub repair: RepairReport,
+    /// how the mesh was made, where the file holds points
+    pub cloud: Option<CloudSummary>,
+}
+
+/// Reads a mesh (PLY, STL, OBJ) and repairs it; of a point cloud (PLY without faces, PCD, text, E57) a surface is made, which a warning
+/// says. Same file, same mesh, on any number of threads.
+///
+/// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
+///
+/// # Errors
+/// [`ScanError`]: one line that names the file and what to do.
+pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
+    let cloud = match read_mesh_or_points(path, unit)? {
+        MeshOrPoints::Mesh(file) => {
+            let MeshFile { mesh, repair } = *file;
+            return Ok(Scan { mesh, repair, cloud: None });
+        }
+        MeshOrPoints::Points(cloud) => cloud,
+    };
+    let no_surface = |source| ScanError::Cloud { path: path.into(), source };
+    let CloudSurface { positions, faces, summary } = surface_of_cloud(cloud, &Threads).map_err(no_surface)?;
+    let MeshFile { mesh, repair } = repaired(path, unit, positions, faces)?;
+    tracing::warn!("{}: {summary}", path.display());
+    Ok(Scan { mesh, repair, cloud: Some(summary) })
+}

@@ -1,0 +1,17 @@
+//! A point cloud of any kind: what is read has as many points as the bytes can hold. The surface through them is left out: its grid takes longer
+//! than all else.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use touchup_fuzz::file;
+use touchup_io::mesh_file::{MeshOrPoints, MeshUnit, read_mesh_or_points};
+
+fuzz_target!(|data: &[u8]| {
+    let Some((&kind, bytes)) = data.split_first() else { return };
+    let path = file(["scan.pcd", "scan.xyz", "scan.e57", "scan.ply"][usize::from(kind) % 4], bytes);
+    let Ok(MeshOrPoints::Points(cloud)) = read_mesh_or_points(&path, MeshUnit::Metre) else { return };
+    let points = cloud.positions;
+    // of all formats the packed one says most: a field of a byte, 88 of which lie in one
+    assert!(points.len() <= 88 * bytes.len(), "{} points of {} bytes", points.len(), bytes.len());
+});
