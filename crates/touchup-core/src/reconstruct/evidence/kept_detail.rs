@@ -23,15 +23,17 @@ const LARGEST_MISMATCH: f64 = 1.0 / 3.0;
 const ALONG: f64 = 0.9;
 /// A contact agrees when its mismatch is that around it but for this, in radii: 0.05 mm for a ball of 1.5 mm.
 const AGREES: f64 = 1.0 / 30.0;
+/// … and for so many standard deviations of its own.
+const SIGMAS: f64 = 2.0;
 /// Vertices may scatter by this around the mean of their neighbours, in radii (root mean square): more is noise that touches do better.
-const SCATTER: f64 = 0.01;
+const SCATTER: f64 = 0.005;
 /// Around a contact the scatter is looked at within this, in radii.
 const AROUND: f64 = 1.0 / 3.0;
 /// Width of the weights, in radii.
 const WIDTH: f64 = 0.5;
 /// Contacts without agreement take the scan from the field within this, in radii.
 const VETO: f64 = 1.0;
-/// What is farther off the moved scan than this, in radii, is another surface.
+/// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
 const LARGEST_OFF: f64 = 0.1;
 /// So far from contacts that agree, in radii, the scan moves along with them …
 const MOVES: f64 = 1.0;
@@ -96,17 +98,17 @@ impl Agreement {
         let (contacts, radius) = (evidence.contacts, evidence.params.radius);
         let mut near = BoxQuery::default();
         let alone = contacts.means().iter().map(|contact| {
-            let is_surface = contact.weight > 0.0 && !contact.is_fan;
-            let mismatch = is_surface.then(|| mismatch_of(evidence, contact))??;
+            let mismatch = if contact.weight > 0.0 { mismatch_of(evidence, contact)? } else { return None };
             is_fine(evidence, contact, &mut near).then_some(mismatch)
         });
         let mut agreement = Self { mismatch: alone.collect(), radius };
-        let agrees = |(contact, mismatch): (&MeanContact, &Option<f64>)| {
+        let agrees = |((contact, mismatch), index): ((&MeanContact, &Option<f64>), u32)| {
             let mismatch = (*mismatch)?;
             let around = agreement.displacement(contacts, &contact.point).0.dot(&contact.normal);
-            ((around - mismatch).abs() <= AGREES * radius).then_some(mismatch)
+            let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
+            ((around - mismatch).abs() <= may_be_off).then_some(mismatch)
         };
-        agreement.mismatch = contacts.means().iter().zip(&agreement.mismatch).map(agrees).collect();
+        agreement.mismatch = contacts.means().iter().zip(&agreement.mismatch).zip(0..).map(agrees).collect();
         agreement
     }
 
@@ -149,9 +151,12 @@ impl Agreement {
         is_known && !is_refused
     }
 
-    /// Whether what is `off` (m) the moved scan may be the same surface.
-    pub fn is_within(&self, off: f64) -> bool {
-        off.abs() <= LARGEST_OFF * self.radius
+    /// Whether the moved scan may be the surface where it is `deeper` (m) than the ball felt it.
+    ///
+    /// - `ends`: what was touched ends here, or may, so that a scan that is deeper may be a blurred edge.
+    pub fn is_within(&self, deeper: f64, ends: bool) -> bool {
+        let deepest = if ends { LARGEST_OFF } else { LARGEST_MISMATCH };
+        (-LARGEST_OFF..=deepest).contains(&(deeper / self.radius))
     }
 }
 

@@ -319,12 +319,12 @@ impl Evidence<'_> {
     /// Whether the scan has the shape that was touched here, and in more detail.
     fn is_detail(&self, touched: Option<&FieldValue>, scan: &ScanDistance, swept_depth: f64) -> bool {
         let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else { return false };
-        let is_alike =
-            |touched: &FieldValue| !touched.is_fan && !touched.is_edge && touched.gradient.dot(&scan.normal) > ALIKE;
-        let off = touched.map_or(0.0, |touched| scan.value - touched.value);
+        let is_alike = |touched: &FieldValue| {
+            let ends = touched.is_border || touched.is_fan || touched.is_edge;
+            agreement.is_within(scan.value - touched.value, ends)
+        };
         touched.is_none_or(is_alike)
-            && agreement.is_within(off)
-            && (scan.value >= 0.0 || agreement.is_within(swept_depth.max(0.0)))
+            && (scan.value >= 0.0 || agreement.is_within(-swept_depth.max(0.0), true))
             && agreement.holds(self.contacts, &scan.foot)
     }
 

@@ -240,10 +240,12 @@ impl AtRest {
                 return Ok(());
             }
             Step::Return(vertex) => {
+                self.support.remove(&vertex);
                 followed.mesh.set_position(vertex, scans.original.position(vertex));
                 return Ok(());
             }
             Step::Unplace(vertex) => {
+                self.support.remove(&vertex);
                 followed.mesh.remove_vertex(vertex);
                 return Ok(());
             }
