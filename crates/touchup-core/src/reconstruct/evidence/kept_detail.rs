@@ -8,17 +8,16 @@
 //!
 //! where d is the distance to the nearest contact that agrees; s falls smoothly from 1 within a radius to 0 at two.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use crate::mesh::{BoxQuery, FaceTree, TriMesh, VertexId};
 use crate::reconstruct::contour::patched::Support;
-use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
+use crate::reconstruct::evidence::agreement::{Agreement, LARGEST_MISMATCH, RESTS};
+use crate::reconstruct::evidence::contact_map::MeanContact;
 use crate::reconstruct::evidence::point_evidence::Evidence;
 
 /// A scan is finer than the tip when its edges are shorter than this, in radii.
 const FINE: f64 = 0.36;
-/// Mismatches beyond this are no agreement, in radii.
-const LARGEST_MISMATCH: f64 = 1.0 / 3.0;
 /// Cosine of the widest angle between the arm to the scan and the normal of the contact.
 const ALONG: f64 = 0.9;
 /// A contact agrees when its mismatch is that around it but for this, in radii: 0.05 mm for a ball of 1.5 mm.
@@ -29,16 +28,6 @@ const SIGMAS: f64 = 2.0;
 const SCATTER: f64 = 0.005;
 /// Around a contact the scatter is looked at within this, in radii.
 const AROUND: f64 = 1.0 / 3.0;
-/// Width of the weights, in radii.
-const WIDTH: f64 = 0.5;
-/// Contacts without agreement take the scan from the field within this, in radii.
-const VETO: f64 = 1.0;
-/// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
-const LARGEST_OFF: f64 = 0.1;
-/// So far from contacts that agree, in radii, the scan moves along with them …
-const MOVES: f64 = 1.0;
-/// … and from here on not at all.
-const RESTS: f64 = 2.0;
 
 /// The scan, moved to where it was touched, and the contacts that it agrees with.
 #[derive(Clone, Debug)]
@@ -52,14 +41,6 @@ pub(in crate::reconstruct) struct KeptDetail {
     pub agreement: Agreement,
 }
 
-/// Which contacts the moved scan agrees with.
-#[derive(Clone, Debug)]
-pub(crate) struct Agreement {
-    /// by number of the mean contact: its mismatch, m, where it agrees
-    mismatch: Vec<Option<f64>>,
-    radius: f64,
-}
-
 impl KeptDetail {
     /// Finds where the scan agrees, and moves it; `None` where it is no finer than the tip, or agrees nowhere.
     pub fn of(evidence: &Evidence<'_>) -> Option<Self> {
@@ -67,7 +48,7 @@ impl KeptDetail {
         if !evidence.free_space.is_of_ball() || scan.mean_edge() >= FINE * radius {
             return None;
         }
-        let agreement = Agreement::of(evidence);
+        let agreement = agreement_of(evidence);
         if agreement.mismatch.iter().all(Option::is_none) {
             return None;
         }
@@ -92,72 +73,23 @@ impl KeptDetail {
     }
 }
 
-impl Agreement {
-    /// Looks at each contact alone, then beside the others.
-    fn of(evidence: &Evidence<'_>) -> Self {
-        let (contacts, radius) = (evidence.contacts, evidence.params.radius);
-        let mut near = BoxQuery::default();
-        let alone = contacts.means().iter().map(|contact| {
-            let mismatch = if contact.weight > 0.0 { mismatch_of(evidence, contact)? } else { return None };
-            is_fine(evidence, contact, &mut near).then_some(mismatch)
-        });
-        let mut agreement = Self { mismatch: alone.collect(), radius };
-        let agrees = |((contact, mismatch), index): ((&MeanContact, &Option<f64>), u32)| {
-            let mismatch = (*mismatch)?;
-            let around = agreement.displacement(contacts, &contact.point).0.dot(&contact.normal);
-            let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
-            ((around - mismatch).abs() <= may_be_off).then_some(mismatch)
-        };
-        agreement.mismatch = contacts.means().iter().zip(&agreement.mismatch).zip(0..).map(agrees).collect();
-        agreement
-    }
-
-    fn agreeing<'a>(&'a self, contacts: &'a ContactMap) -> impl Iterator<Item = (&'a MeanContact, f64)> {
-        contacts.means().iter().zip(&self.mismatch).filter_map(|(contact, mismatch)| Some((contact, (*mismatch)?)))
-    }
-
-    /// u(x), m, and s.
-    fn displacement(&self, contacts: &ContactMap, x: &Point3<f64>) -> (Vector3<f64>, f64) {
-        let of = |index: u32| self.mismatch[index as usize];
-        let mut nearest = f64::INFINITY;
-        contacts.near(x, RESTS * self.radius, |distance_squared, index| {
-            nearest = if of(index).is_some() { nearest.min(distance_squared) } else { nearest };
-        });
-        if !nearest.is_finite() {
-            return (Vector3::zeros(), 0.0);
-        }
-        let width = (WIDTH * self.radius).powi(2).max(0.5 * nearest);
-        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
-        contacts.near(x, RESTS * self.radius, |distance_squared, index| {
-            if let Some(mismatch) = of(index) {
-                let contact = &contacts.means()[index as usize];
-                let weight = contact.weight * (-(distance_squared - nearest) / width).exp();
-                sum += contact.normal * (weight * mismatch);
-                weights += weight;
-            }
-        });
-        let share = ((RESTS - nearest.sqrt() / self.radius) / (RESTS - MOVES)).clamp(0.0, 1.0);
-        (sum * (share * share * (3.0 - 2.0 * share) / weights), share)
-    }
-
-    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and all that are nearest do.
-    pub fn holds(&self, contacts: &ContactMap, foot: &Point3<f64>) -> bool {
-        let (mut is_known, mut is_refused) = (false, false);
-        contacts.near(foot, RESTS * self.radius, |distance_squared, index| {
-            let agrees = self.mismatch[index as usize].is_some();
-            is_known |= agrees;
-            is_refused |= !agrees && distance_squared < (VETO * self.radius).powi(2);
-        });
-        is_known && !is_refused
-    }
-
-    /// Whether the moved scan may be the surface where it is `deeper` (m) than the ball felt it.
-    ///
-    /// - `ends`: what was touched ends here, or may, so that a scan that is deeper may be a blurred edge.
-    pub fn is_within(&self, deeper: f64, ends: bool) -> bool {
-        let deepest = if ends { LARGEST_OFF } else { LARGEST_MISMATCH };
-        (-LARGEST_OFF..=deepest).contains(&(deeper / self.radius))
-    }
+/// Looks at each contact alone, then beside the others.
+fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
+    let (contacts, radius) = (evidence.contacts, evidence.params.radius);
+    let mut near = BoxQuery::default();
+    let alone = contacts.means().iter().map(|contact| {
+        let mismatch = if contact.weight > 0.0 { mismatch_of(evidence, contact)? } else { return None };
+        is_fine(evidence, contact, &mut near).then_some(mismatch)
+    });
+    let mut agreement = Agreement { mismatch: alone.collect(), radius };
+    let agrees = |((contact, mismatch), index): ((&MeanContact, &Option<f64>), u32)| {
+        let mismatch = (*mismatch)?;
+        let around = agreement.displacement(contacts, &contact.point).0.dot(&contact.normal);
+        let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
+        ((around - mismatch).abs() <= may_be_off).then_some(mismatch)
+    };
+    agreement.mismatch = contacts.means().iter().zip(&agreement.mismatch).zip(0..).map(agrees).collect();
+    agreement
 }
 
 /// How far the ball of a contact is above the scan, m; negative: in it.

@@ -1,5 +1,6 @@
 //! Evidence for the surface: contacts, free space, signed distance of the scan.
 
+pub(in crate::reconstruct) mod agreement;
 pub(in crate::reconstruct) mod contact_map;
 pub(in crate::reconstruct) mod contact_statistics;
 pub(in crate::reconstruct) mod contact_uncertainty;

@@ -4,10 +4,10 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::direction;
+use crate::reconstruct::evidence::agreement::Agreement;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
-use crate::reconstruct::evidence::kept_detail::Agreement;
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
@@ -321,10 +321,11 @@ impl Evidence<'_> {
         let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else { return false };
         let is_alike = |touched: &FieldValue| {
             let ends = touched.is_border || touched.is_fan || touched.is_edge;
-            agreement.is_within(scan.value - touched.value, ends)
+            let is_felt = touched.lateral() <= BORDER_SUPPORT * self.params.radius;
+            agreement.is_alike(scan.value - touched.value, is_felt, ends)
         };
         touched.is_none_or(is_alike)
-            && (scan.value >= 0.0 || agreement.is_within(-swept_depth.max(0.0), true))
+            && (scan.value >= 0.0 || agreement.is_alike(-swept_depth.max(0.0), true, true))
             && agreement.holds(self.contacts, &scan.foot)
     }
 
