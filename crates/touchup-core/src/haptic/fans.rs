@@ -14,7 +14,7 @@ use crate::numeric::direction;
 /// that plane that lie beside each other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fans {
-    list: Vec<Fan>,
+    list: Vec<CornerFan>,
     /// numbers in the ring of those faces of the fans that move, fan after fan
     moving: Vec<u32>,
     /// corners of the moving faces by number …
@@ -29,7 +29,7 @@ pub(super) struct Fans {
 type Spoke = (VertexId, Vector3<f64>);
 
 #[derive(Clone, Copy, Debug)]
-struct Fan {
+struct CornerFan {
     corner: VertexId,
     /// of the normals, unit
     mean: Vector3<f64>,
@@ -64,7 +64,7 @@ impl Fans {
             if let Some(mean) = mean {
                 let numbers = mesh.star(corner).iter().filter_map(|&face| ring.number_of(face));
                 self.moving.extend(numbers.filter(|&number| (number as usize) < ring.moving));
-                self.list.push(Fan { corner, mean, end: self.moving.len() as u32 });
+                self.list.push(CornerFan { corner, mean, end: self.moving.len() as u32 });
             }
         }
     }

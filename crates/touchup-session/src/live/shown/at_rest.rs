@@ -10,7 +10,7 @@ use super::followed::{FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remo
 /// The patch of all touches, as far as it is shown.
 #[derive(Debug, Default)]
 pub(super) struct AtRest {
-    phase: Phase,
+    phase: RestPhase,
     /// the patch that is to be shown once the working mesh is followed
     wanted: Option<PatchDelta>,
     /// … and the one that is
@@ -27,7 +27,7 @@ pub(super) struct AtRest {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Phase {
+enum RestPhase {
     /// the working mesh is followed
     #[default]
     Following,
@@ -73,7 +73,7 @@ enum Step {
 impl AtRest {
     /// Whether the patch of all touches is shown, all of it.
     pub fn is_there(&self) -> bool {
-        self.phase == Phase::Resting && self.steps.is_empty()
+        self.phase == RestPhase::Resting && self.steps.is_empty()
     }
 
     /// The support of a vertex of the patch of all touches.
@@ -85,13 +85,13 @@ impl AtRest {
     pub fn want(&mut self, patch: PatchDelta, working: &TriMesh) {
         let Self { phase, patch: shown, edits, wanted, .. } = self;
         let is_same = shown.vertices == patch.vertices && shown.owners == patch.owners && shown.faces == patch.faces;
-        let is_shown = is_same && *phase == Phase::Resting && *edits == working.edits();
+        let is_shown = is_same && *phase == RestPhase::Resting && *edits == working.edits();
         *wanted = (!is_shown).then_some(patch);
     }
 
     /// Whether the patch of all touches is shown, or about to be.
     pub fn is_wanted(&self, working: &TriMesh) -> bool {
-        self.wanted.is_some() || self.phase == Phase::Resting && self.edits == working.edits()
+        self.wanted.is_some() || self.phase == RestPhase::Resting && self.edits == working.edits()
     }
 
     /// Where the patch of all touches is wanted, begins with it; returns whether there is anything to do for it.
@@ -124,7 +124,7 @@ impl AtRest {
         }));
         steps.extend((0..patch.faces.len() as u32).map(Step::Fill));
         steps.reverse();
-        (self.phase, self.steps, self.edits) = (Phase::Resting, steps, working.edits());
+        (self.phase, self.steps, self.edits) = (RestPhase::Resting, steps, working.edits());
         self.patch = patch;
         self.placed.clear();
         true
@@ -146,15 +146,15 @@ impl AtRest {
             let Some(step) = self.steps.pop() else {
                 let has_changed = working.edits() != self.edits || self.wanted.is_some();
                 self.phase = match self.phase {
-                    Phase::Resting if has_changed => {
+                    RestPhase::Resting if has_changed => {
                         self.steps = std::mem::take(&mut self.back);
-                        Phase::Leaving
+                        RestPhase::Leaving
                     }
-                    Phase::Leaving => {
+                    RestPhase::Leaving => {
                         (self.patch, self.placed, self.support) = Default::default();
-                        Phase::Following
+                        RestPhase::Following
                     }
-                    phase => return Ok(phase != Phase::Leaving),
+                    phase => return Ok(phase != RestPhase::Leaving),
                 };
                 continue;
             };
