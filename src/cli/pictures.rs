@@ -52,5 +52,5 @@ pub(super) fn write_coloured(
     let named = ["red", "green", "blue"].into_iter().enumerate();
     let channels = named.map(|(at, name)| VertexColumn { name, values: channel(at) });
     let columns: Vec<_> = channels.chain(further).collect();
-    write_mesh_with(path, mesh, &columns, unit).map_err(CliError::not_written)
+    write_mesh_with(path, mesh, &columns, None, unit).map_err(CliError::not_written)
 }

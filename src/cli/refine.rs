@@ -334,6 +334,7 @@ impl RefineArguments {
         let places = OutcomePlaces {
             mesh: &self.out,
             unit: self.mesh_unit,
+            scan: &self.scan,
             features: self.features_out.as_deref(),
             touches: self.touches_out.as_deref(),
             outside: cut.outside.as_ref(),

@@ -277,7 +277,8 @@ impl ResultFiles {
     ) -> Result<Outcome, Box<OutcomeError>> {
         let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
         let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
-        let places = OutcomePlaces { mesh: &self.mesh, unit, features, touches, outside, must_change: false };
+        let (mesh, scan) = (&self.mesh, &setup.scan_path);
+        let places = OutcomePlaces { mesh, unit, scan, features, touches, outside, must_change: false };
         Ok(match patcher {
             Some(patcher) => places.write_patched(&setup.scan.0, patcher)?,
             None => places.write_moved(&setup.scan.0, refined)?,

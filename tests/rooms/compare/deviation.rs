@@ -388,7 +388,7 @@ fn columns_come_back_by_vertex_through_repair() {
         colours.iter().map(|(name, values)| VertexColumn { name, values: values.clone().into() }).collect();
     columns.push(VertexColumn { name: "deviation_mm", values: vec![0.5f32, -0.25, 0.0, 1e-3].into() });
     let path = folder.path().join("b.ply");
-    write_mesh_with(&path, &mesh, &columns, unit).unwrap();
+    write_mesh_with(&path, &mesh, &columns, None, unit).unwrap();
     let again = read_mesh(&path, unit).unwrap().mesh;
     let written = fs::read(&path).unwrap();
     assert!(
@@ -485,7 +485,7 @@ fn a_refined_mesh_is_reported_by_support() {
     let path = folder.path().join("refined.ply");
     let mesh = square(4, 0.25e-3);
     let region_sizes = |columns: &[VertexColumn]| -> Vec<(String, u64)> {
-        write_mesh_with(&path, &mesh, columns, MeshUnit::Millimetre).unwrap();
+        write_mesh_with(&path, &mesh, columns, None, MeshUnit::Millimetre).unwrap();
         let output = touchup(&["compare", path.to_str().unwrap(), &truth, "--samples", "1000", "--json"]);
         let (code, out, err) = parts_of(&output);
         assert_eq!((code, err), (0, ""));

@@ -2,8 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
-use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
-use touchup::mesh::{FaceId, TriMesh, VertexId, repair};
+use touchup::io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
+use touchup::io::mesh_file::{read_appearance, read_mesh, write_mesh, write_mesh_with};
+use touchup::mesh::{Alone, FaceId, Texture, TriMesh, VertexColours, VertexId, repair};
 
 use crate::allocations::largest_request;
 use crate::shared::shared;
@@ -236,7 +237,7 @@ fn columns_are_properties_of_the_vertices_in_ply() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
     let column = VertexColumn { name: "touched", values: vec![0.0, 0.5, 9.0, 1.0, 0.25].into() };
-    write_mesh_with(&path, &mesh, &[column], Metre).unwrap();
+    write_mesh_with(&path, &mesh, &[column], None, Metre).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let end = b"end_header\n";
     let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
@@ -247,6 +248,74 @@ fn columns_are_properties_of_the_vertices_in_ply() {
     assert_eq!([0, 1, 2, 3].map(value), [0.0, 0.5, 1.0, 0.25]);
     let read = read_mesh(&path, Metre).unwrap().mesh;
     assert_eq!((read.vertex_count(), corners_of(&read)), (4, corners_of(&mesh)));
+}
+
+/// A square of two triangles, the second one with an image of its own, as text of both kinds; colours by hand.
+#[test]
+fn colours_and_textures_come_back_from_either_kind_of_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let ply = "ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile sub/c.png\nelement vertex 4\n\
+               property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+               property uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n\
+               property list uchar float texcoord\nproperty int texnumber\nend_header\n\
+               0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n1 1 0 255 0 128\n\
+               3 0 1 2 6 0 0 1 0 0 1 0\n3 1 3 2 6 .25 .5 .5 .5 .25 .75 1\n";
+    let obj = "mtllib m.mtl\nv 0 0 0 .004 .008 .012\nv 1 0 0 .016 .02 .024\nv 0 1 0 .027 .031 .035\nv 1 1 0 1 0 .5\n\
+               vt 0 0\nvt 1 0\nvt 0 1\nvt .25 .5\nvt .5 .5\nvt .25 .75\nusemtl x\nf 1/1 2/2 3/3\nusemtl y\nf 2/4 4/5 3/6\n";
+    std::fs::write(at("in.ply"), ply).unwrap();
+    std::fs::write(at("in.obj"), obj).unwrap();
+    std::fs::write(at("m.mtl"), "newmtl x\nmap_Kd a b.png\nnewmtl y\nmap_Kd sub/c.png\n").unwrap();
+    let colours = vec![[1, 2, 3], [4, 5, 6], [7, 8, 9], [255, 0, 128]];
+    let corners = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0.25, 0.5], [0.5, 0.5], [0.25, 0.75]]];
+    let images = vec![at("a b.png"), at("sub/c.png")];
+    let texture = Texture { corners, shown: vec![0, 1], images };
+    let check = |name: &str| {
+        let appearance = read_appearance(&at(name), Metre).unwrap().expect("it says how it looks");
+        let mesh = read_mesh(&at(name), Metre).unwrap().mesh;
+        assert_eq!(appearance.colours_at(mesh.positions(), &Alone), Some(VertexColours::Rgb(colours.clone())), "{name}");
+        assert_eq!(appearance.texture_on(&mesh, mesh.positions(), &Alone), Some(texture.clone()), "{name}");
+        mesh
+    };
+    check("in.obj");
+    let mesh = check("in.ply");
+    let columns = VertexColumn::of_colours(VertexColours::Rgb(colours.clone()));
+    for name in ["out.ply", "out.obj"] {
+        write_mesh_with(&at(name), &mesh, &columns, Some(&texture), Metre).unwrap();
+        check(name);
+    }
+    assert!(std::fs::read_to_string(at("out.mtl")).unwrap().contains("map_Kd sub/c.png"));
+    // elsewhere the images have their whole names
+    std::fs::create_dir(at("sub")).unwrap();
+    write_mesh_with(&at("sub/out.ply"), &mesh, &columns, Some(&texture), Metre).unwrap();
+    check("sub/out.ply");
+    let text = std::fs::read(at("sub/out.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&text).contains("TextureFile c.png\n"));
+}
+
+#[test]
+fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let mesh = read_mesh(&path, Metre).unwrap().mesh;
+        read_appearance(&path, Metre).unwrap().and_then(|look| look.colours_at(mesh.positions(), &Alone))
+    };
+    let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    let tail = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let of = |kind: &str| format!("{head}property {kind} red\nproperty {kind} green\nproperty {kind} blue\nproperty {kind} alpha\n{tail}");
+    let shares = of("float") + "0 0 0 0 .5 1 1\n1 0 0 .2 .4 .6 .8\n0 1 0 1 1 1 0\n3 0 1 2\n";
+    let expected = VertexColours::Rgba(vec![[0, 128, 255, 255], [51, 102, 153, 204], [255, 255, 255, 0]]);
+    assert_eq!(read("shares.ply", &shares), Some(expected));
+    let obj = |last: &str| format!("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0{last}\nf 1 2 3\n");
+    assert_eq!(read("some.obj", &obj("")), None);
+    let expected = VertexColours::Rgb(vec![[255, 0, 0], [0, 255, 0], [0, 0, 255]]);
+    assert_eq!(read("all.obj", &obj(" 0 0 1")), Some(expected));
+    // beyond what a colour can be
+    let beyond = of("float") + "0 0 0 -1 2 nan 1\n1 0 0 0 0 0 1\n0 1 0 0 0 0 1\n3 0 1 2\n";
+    let expected = VertexColours::Rgba(vec![[0, 255, 0, 255], [0, 0, 0, 255], [0, 0, 0, 255]]);
+    assert_eq!(read("beyond.ply", &beyond), Some(expected));
 }
 
 #[test]

@@ -251,7 +251,7 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
     let columns = patched.columns().into_iter();
     let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
-    write_mesh_with(&plate.at("live.ply"), &patched.mesh, &columns, MeshUnit::Millimetre).unwrap();
+    write_mesh_with(&plate.at("live.ply"), &patched.mesh, &columns, None, MeshUnit::Millimetre).unwrap();
 
     for out in ["one.ply", "two.ply"] {
         let output = plate.refine(out, &[]);

@@ -1,5 +1,6 @@
 //! Triangle meshes: positions, adjacency, repair, closest face, signed distance.
 
+mod appearance;
 mod closest;
 mod coherent;
 mod ids;
@@ -15,6 +16,7 @@ mod tri_mesh;
 pub mod triangle;
 mod workers;
 
+pub use appearance::{Appearance, Texture, VertexColours};
 pub use closest::{BoxQuery, FaceHit, FaceTree, Nearby, RefitPlan};
 pub(crate) use coherent::coherent_order;
 pub use ids::{FaceId, VertexId};

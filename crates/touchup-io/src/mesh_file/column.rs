@@ -1,5 +1,7 @@
 //! Further numbers of the vertices of a mesh.
 
+use touchup_core::mesh::VertexColours;
+
 /// One number for each vertex of a mesh, by id; a property of the vertices in a PLY file.
 #[derive(Clone, Debug)]
 pub struct VertexColumn {
@@ -7,6 +9,20 @@ pub struct VertexColumn {
     pub name: &'static str,
     /// as many as the mesh has vertices
     pub values: ColumnValues,
+}
+
+impl VertexColumn {
+    /// A column for each colour, named as most programs name them.
+    pub fn of_colours(colours: VertexColours) -> Vec<Self> {
+        fn columns<const N: usize>(of: &[[u8; N]]) -> Vec<VertexColumn> {
+            let column = |(at, name)| VertexColumn { name, values: of.iter().map(|c| c[at]).collect::<Vec<_>>().into() };
+            (0..N).zip(["red", "green", "blue", "alpha"]).map(column).collect()
+        }
+        match colours {
+            VertexColours::Rgb(of) => columns(&of),
+            VertexColours::Rgba(of) => columns(&of),
+        }
+    }
 }
 
 /// The numbers of a [`VertexColumn`], with their type in the file.

@@ -1,5 +1,6 @@
 //! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in.
 
+mod appearance;
 mod column;
 mod defect;
 mod obj;
@@ -17,12 +18,14 @@ use nalgebra::Point3;
 use super::atomic::AtomicFile;
 pub use super::file_error::FilePlace;
 use super::file_error::{FileError, read_file, write_file};
+use appearance::SoupTexture;
+pub use appearance::read_appearance;
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
 use point_cloud::CloudFormat;
 use soup::Soup;
-use touchup_core::mesh::{FARTHEST, MeshError, PointCloud, RepairReport, TriMesh, is_place, repair};
+use touchup_core::mesh::{FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Why a mesh file could not be read or written.
@@ -275,10 +278,11 @@ pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
 /// # Errors
 /// [`MeshFileError::UnknownFormat`], [`MeshFileError::NoPlace`], [`MeshFileError::File`].
 pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), MeshFileError> {
-    write_mesh_with(path, mesh, &[], unit)
+    write_mesh_with(path, mesh, &[], None, unit)
 }
 
-/// [`write_mesh`] with `columns`, which STL and OBJ have no place for.
+/// [`write_mesh`] with `columns` and `texture`: PLY has a place for all of it, OBJ for the texture and colours (`red`, `green`, `blue`),
+/// STL for nothing. Images stay where they are; those of an OBJ are named in a file of the same name that ends in `.mtl`.
 ///
 /// # Errors
 /// As [`write_mesh`].
@@ -286,6 +290,7 @@ pub fn write_mesh_with(
     path: &Path,
     mesh: &TriMesh,
     columns: &[VertexColumn],
+    texture: Option<&Texture>,
     unit: MeshUnit,
 ) -> Result<(), MeshFileError> {
     let format = Format::of_name(path)?;
@@ -293,9 +298,16 @@ pub fn write_mesh_with(
         return Err(MeshFileError::NoPlace { path: path.into(), vertex: vertex as u32 });
     }
     let ((soup, ids), unit) = (Soup::used_part(mesh, unit.metres()), unit.to_string());
+    let texture = texture.map(|texture| SoupTexture::of(texture, mesh, path.parent().unwrap_or(Path::new(""))));
+    let (texture, materials) = (texture.as_ref(), path.with_extension("mtl"));
+    let images = texture.map_or(&[][..], |texture| &texture.images);
+    if matches!(format, Format::Obj) && !images.is_empty() {
+        write_file(&materials, |out| obj::write_materials(images, out))?;
+    }
+    let materials = materials.file_name().unwrap_or_default().to_string_lossy();
     Ok(write_file(path, |out| match format {
-        Format::Ply => ply::write(&soup, &ids, columns, &unit, out),
+        Format::Ply => ply::write(&soup, &ids, columns, texture, &unit, out),
         Format::Stl => stl::write(&soup, &unit, out),
-        Format::Obj => obj::write(&soup, &unit, out),
+        Format::Obj => obj::write(&soup, &ids, columns, texture, [&unit, &materials], out),
     })?)
 }

@@ -1,11 +1,18 @@
 //! Wavefront OBJ, parsed by `tobj`.
 
 use std::borrow::Cow;
-use std::io::{self, BufRead, Read, Write};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::Path;
 
 use nalgebra::Point3;
-use tobj::{LoadError, LoadOptions};
+use tobj::{LoadError, LoadOptions, Material, Model};
+use touchup_core::mesh::VertexColours;
 
+use super::appearance::{PaintedSoup, SoupTexture};
+use super::column::{ColumnValues, VertexColumn};
 use super::defect::{Defect, Syntax};
 use super::soup::Soup;
 use super::text::NumberedLines;
@@ -15,19 +22,74 @@ use crate::file_error::FilePlace;
 /// and materials are passed over. Vertices come in the order in which faces first name them.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let bytes = as_utf8(bytes)?;
-    let mut geometry = Geometry { rest: &bytes, line: &[], shortened: false, number: 0, vertices: 0 };
-    let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut geometry, &options, no_materials)
-        .map_err(|error| place_of(error, &bytes, geometry.number))?;
+    let mut lines = Lines::new(&bytes, false);
+    let no_materials = |_: &Path| Err(LoadError::OpenFileFailed);
+    let (models, _) = load(&bytes, &mut lines, no_materials)?;
     let mut soup = Soup::default();
-    for model in models {
-        let first = soup.positions.len() as u32;
-        soup.positions.extend(model.mesh.positions.as_chunks().0.iter().map(|&p| Point3::from(p) * scale));
-        soup.faces.extend(model.mesh.indices.as_chunks().0.iter().map(|f| f.map(|v| v + first)));
-    }
-    soup.unused = geometry.vertices - soup.positions.len().min(geometry.vertices);
+    models.iter().for_each(|model| take(model, scale, &mut soup.positions, &mut soup.faces));
+    soup.unused = lines.vertices - soup.positions.len().min(lines.vertices);
     Ok(soup)
+}
+
+/// The triangles as [`read`] has them, and how they look; what materials say is read from `folder`.
+///
+/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates.
+pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
+    let bytes = as_utf8(bytes)?;
+    let mut lines = Lines::new(&bytes, true);
+    lines.has_colours = every_vertex_has_a_colour(&bytes);
+    // a file of materials that is not there, or damaged, names no image
+    let materials = |name: &Path| {
+        let file = File::open(folder.join(name)).map_err(|_| LoadError::OpenFileFailed)?;
+        tobj::load_mtl_buf(&mut BufReader::new(file))
+    };
+    let (models, materials) = load(&bytes, &mut lines, materials)?;
+    let (mut soup, mut texture, mut colours) = (PaintedSoup::default(), SoupTexture::default(), Vec::new());
+    let mut image_of = vec![None; materials.len()];
+    for Model { mesh, .. } in &models {
+        let of = |&corner: &u32| mesh.texcoords.as_chunks().0.get(corner as usize).map_or([0.0; 2], |uv| uv.map(|x| x as f32));
+        let triangles = mesh.texcoord_indices.as_chunks::<3>().0;
+        texture.corners.extend(triangles.iter().map(|[a, b, c]| [of(a), of(b), of(c)]));
+        // a model without texture coordinates between others that have them
+        let count = soup.faces.len() + mesh.indices.len() / 3;
+        texture.corners.resize(count, [[0.0; 2]; 3]);
+        let shown = mesh.material_id.and_then(|id| {
+            let name = materials.get(id)?.diffuse_texture.clone()?;
+            Some(*image_of[id].get_or_insert_with(|| {
+                texture.images.push(name);
+                texture.images.len() as u32 - 1
+            }))
+        });
+        texture.shown.resize(count, shown.unwrap_or(0));
+        colours.extend(mesh.vertex_color.as_chunks().0.iter().map(|of| of.map(|x| (x * 255.0).round() as u8)));
+    }
+    for model in &models {
+        take(model, scale, &mut soup.positions, &mut soup.faces);
+    }
+    let has_texture = models.iter().any(|model| !model.mesh.texcoord_indices.is_empty());
+    soup.texture = has_texture.then_some(texture);
+    soup.colours = (!colours.is_empty() && colours.len() == soup.positions.len()).then_some(VertexColours::Rgb(colours));
+    Ok(soup)
+}
+
+type Loaded = (Vec<Model>, Vec<Material>);
+
+fn load(
+    bytes: &[u8],
+    lines: &mut Lines,
+    materials: impl Fn(&Path) -> tobj::MTLLoadResult,
+) -> Result<Loaded, Syntax> {
+    let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let loaded = tobj::load_obj_buf(&mut *lines, &options, materials);
+    let (models, materials) = loaded.map_err(|error| place_of(error, bytes, lines.number))?;
+    Ok((models, materials.unwrap_or_default()))
+}
+
+/// Adds the triangles of a model.
+fn take(model: &Model, scale: f64, positions: &mut Vec<Point3<f64>>, faces: &mut Vec<[u32; 3]>) {
+    let first = positions.len() as u32;
+    positions.extend(model.mesh.positions.as_chunks().0.iter().map(|&p| Point3::from(p) * scale));
+    faces.extend(model.mesh.indices.as_chunks().0.iter().map(|f| f.map(|v| v + first)));
 }
 
 /// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any encoding.
@@ -43,9 +105,13 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
-/// Passes on the lines that make the mesh, `v` without colours and `f`, and counts.
-struct Geometry<'a> {
+/// Passes on the lines that make the mesh, `v` without colours and `f`, or also what says how it looks, and counts.
+struct Lines<'a> {
     rest: &'a [u8],
+    /// `vt`, `mtllib` and `usemtl` too
+    is_painted: bool,
+    /// … and colours
+    has_colours: bool,
     line: &'a [u8],
     /// the end of the line was cut off with its colour
     shortened: bool,
@@ -54,7 +120,18 @@ struct Geometry<'a> {
     vertices: usize,
 }
 
-impl BufRead for Geometry<'_> {
+impl<'a> Lines<'a> {
+    fn new(rest: &'a [u8], is_painted: bool) -> Self {
+        Self { rest, is_painted, has_colours: false, line: &[], shortened: false, number: 0, vertices: 0 }
+    }
+
+    fn is_passed_on(&self, line: &[u8]) -> bool {
+        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        matches!(word, b"v" | b"f") || (self.is_painted && matches!(word, b"vt" | b"mtllib" | b"usemtl"))
+    }
+}
+
+impl BufRead for Lines<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.line.is_empty() && std::mem::take(&mut self.shortened) {
             self.line = b"\n";
@@ -64,9 +141,10 @@ impl BufRead for Geometry<'_> {
             let (line, rest) = self.rest.split_at(len);
             (self.rest, self.number) = (rest, self.number + 1);
             let kind = line.trim_ascii_start();
-            if let [kind @ (b'v' | b'f'), b' ' | b'\t', ..] = kind {
-                self.vertices += usize::from(*kind == b'v');
-                self.line = if *kind == b'v' { without_colour(line) } else { line };
+            if self.is_passed_on(kind) {
+                let is_vertex = matches!(kind, [b'v', b' ' | b'\t', ..]);
+                self.vertices += usize::from(is_vertex);
+                self.line = if is_vertex && !self.has_colours { without_colour(line) } else { line };
                 self.shortened = self.line.len() < line.len();
             }
         }
@@ -78,12 +156,18 @@ impl BufRead for Geometry<'_> {
     }
 }
 
-impl Read for Geometry<'_> {
+impl Read for Lines<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let amount = self.fill_buf()?.read(out)?;
         self.consume(amount);
         Ok(amount)
     }
+}
+
+fn every_vertex_has_a_colour(bytes: &[u8]) -> bool {
+    let lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii_start);
+    let mut vertices = lines.filter(|line| matches!(line, [b'v', b' ' | b'\t', ..]));
+    vertices.all(|line| line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count() == 7)
 }
 
 /// The line up to the third coordinate when more than a weight follows: files in which only some vertices have a colour
@@ -140,14 +224,70 @@ fn first_bad_face(bytes: &[u8]) -> Option<Syntax> {
     None
 }
 
-/// OBJ with the fewest digits that read back as the same number, at most 17.
-pub(super) fn write(soup: &Soup, unit: &str, out: &mut impl Write) -> io::Result<()> {
+/// OBJ with the fewest digits that read back as the same number, at most 17; with the colours among `columns`, by `ids` of the vertices.
+///
+/// - `materials`: name of the file of materials, where images are known.
+pub(super) fn write(
+    soup: &Soup,
+    ids: &[usize],
+    columns: &[VertexColumn],
+    texture: Option<&SoupTexture>,
+    [unit, materials]: [&str; 2],
+    out: &mut impl Write,
+) -> io::Result<()> {
     writeln!(out, "# touchup, unit {unit}, frame O")?;
-    for p in &soup.positions {
-        writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
+    let has_images = texture.is_some_and(|texture| !texture.images.is_empty());
+    if has_images {
+        writeln!(out, "mtllib {materials}")?;
     }
-    for [a, b, c] in &soup.faces {
-        writeln!(out, "f {} {} {}", u64::from(*a) + 1, u64::from(*b) + 1, u64::from(*c) + 1)?;
+    let bytes = |name| match columns.iter().find(|column| column.name == name).map(|column| &column.values) {
+        Some(ColumnValues::Byte(values)) => Some(values),
+        _ => None,
+    };
+    let colours = bytes("red").zip(bytes("green")).zip(bytes("blue"));
+    for (p, &id) in soup.positions.iter().zip(ids) {
+        write!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
+        if let Some(((r, g), b)) = colours {
+            // four digits give back the byte
+            [r, g, b].iter().try_for_each(|values| write!(out, " {:.4}", f64::from(values[id]) / 255.0))?;
+        }
+        writeln!(out)?;
+    }
+    let Some(texture) = texture else {
+        return soup.faces.iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", named(*a), named(*b), named(*c)));
+    };
+    let mut numbers = HashMap::new();
+    for uv in texture.corners.as_flattened() {
+        let next = numbers.len() as u64 + 1;
+        if let Entry::Vacant(entry) = numbers.entry(uv.map(f32::to_bits)) {
+            entry.insert(next);
+            writeln!(out, "vt {:?} {:?}", uv[0], uv[1])?;
+        }
+    }
+    let mut used = None;
+    for ((corners, shown), coordinates) in soup.faces.iter().zip(&texture.shown).zip(&texture.corners) {
+        if has_images && used != Some(shown) {
+            writeln!(out, "usemtl {}", material(*shown))?;
+            used = Some(shown);
+        }
+        write!(out, "f")?;
+        for (v, uv) in corners.iter().zip(coordinates) {
+            write!(out, " {}/{}", named(*v), numbers[&uv.map(f32::to_bits)])?;
+        }
+        writeln!(out)?;
     }
     Ok(())
+}
+
+/// The materials that [`write`] names: an image each.
+pub(super) fn write_materials(images: &[String], out: &mut impl Write) -> io::Result<()> {
+    images.iter().zip(0..).try_for_each(|(image, at)| writeln!(out, "newmtl {}\nKd 1 1 1\nmap_Kd {image}", material(at)))
+}
+
+fn material(shown: u32) -> String {
+    format!("image_{shown}")
+}
+
+fn named(vertex: u32) -> u64 {
+    u64::from(vertex) + 1
 }

@@ -4,18 +4,21 @@ use std::fmt;
 use std::path::Path;
 use std::time::Instant;
 
+use nalgebra::Point3;
 use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
 use crate::reported;
+use crate::threads::Threads;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Patched, Patcher, Support};
 use touchup_core::stylus::ProbedPoint;
 use touchup_io::features_file::{FeatureFile, FeaturesFileError, write_features};
-use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn, read_mesh, write_mesh, write_mesh_with};
+use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
+use touchup_io::mesh_file::{read_appearance, read_mesh, write_mesh_with};
 use touchup_io::touches_file::{TouchesFileError, as_written, write_touches};
 
 /// Why a result was not written.
@@ -46,8 +49,10 @@ pub enum OutcomeError {
 pub struct OutcomePlaces<'a> {
     /// the refined mesh
     pub mesh: &'a Path,
-    /// unit of its coordinates
+    /// unit of its coordinates, and of those of the scan
     pub unit: MeshUnit,
+    /// the file of the scan: its colours and texture coordinates are carried over
+    pub scan: &'a Path,
     /// features of the refined mesh, measured by the touches
     pub features: Option<&'a Path>,
     /// the touches that features name
@@ -113,14 +118,25 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
 }
 
-/// A remeshed part, with the rest of its scan.
+/// For each vertex of a refined mesh its place in the scan, m in O; `None` where it is new.
+fn origins(scan: &TriMesh, refined: &TriMesh) -> Vec<Option<Point3<f64>>> {
+    (0..refined.vertex_slots()).map(|vertex| scan.positions().get(vertex).copied()).collect()
+}
+
+/// A remeshed part with the rest of its scan, and the places of its vertices in the scan.
 ///
 /// - `of_scan`: standard deviation of a vertex that was not touched, m.
-fn sewn(part: Patched, outside: &Outside, of_scan: f64) -> Result<Patched, MeshError> {
+fn sewn(
+    part: Patched,
+    origins: &[Option<Point3<f64>>],
+    outside: &Outside,
+    of_scan: f64,
+) -> Result<(Patched, Vec<Option<Point3<f64>>>), MeshError> {
     let sewn = outside.sew_to(&part.mesh)?;
     let support = sewn.column(&part.support, Support::Scan);
     let sigma = if part.sigma.is_empty() { Vec::new() } else { sewn.column(&part.sigma, of_scan) };
-    Ok(Patched { mesh: sewn.mesh, support, sigma, ..part })
+    let origins = sewn.column(origins, None);
+    Ok((Patched { mesh: sewn.mesh, support, sigma, ..part }, origins))
 }
 
 /// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
@@ -140,9 +156,12 @@ impl OutcomePlaces<'_> {
     pub fn write_moved(&self, scan: &TriMesh, refined: &TriMesh) -> Result<Outcome, OutcomeError> {
         let moved_faces = moved_faces(scan, refined);
         self.check_changed(moved_faces as usize)?;
-        let sewn = self.outside.map(|outside| outside.sew_to(refined)).transpose()?;
-        let refined = sewn.as_ref().map_or(refined, |sewn| &sewn.mesh);
-        write_mesh(self.mesh, refined, self.unit).map_err(OutcomeError::WriteMesh)?;
+        let (sewn, own) = (self.outside.map(|outside| outside.sew_to(refined)).transpose()?, origins(scan, refined));
+        let (refined, origins) = match &sewn {
+            Some(sewn) => (&sewn.mesh, sewn.column(&own, None)),
+            None => (refined, own),
+        };
+        self.write_mesh(refined, &origins, Vec::new())?;
         self.write_features(&[])?;
         Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) })
     }
@@ -170,13 +189,14 @@ impl OutcomePlaces<'_> {
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
         let moved_faces = moved_faces(scan, &patched.mesh);
         let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
-        let patched = match self.outside {
-            Some(outside) => sewn(patched, outside, of_scan)?,
-            None => patched,
+        let own = origins(scan, &patched.mesh);
+        let (patched, origins) = match self.outside {
+            Some(outside) => sewn(patched, &own, outside, of_scan)?,
+            None => (patched, own),
         };
         let columns = patched.columns().into_iter();
-        let columns: Vec<_> = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
-        write_mesh_with(self.mesh, &patched.mesh, &columns, self.unit).map_err(OutcomeError::WriteMesh)?;
+        let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
+        self.write_mesh(&patched.mesh, &origins, columns)?;
         debug!(open_squares = patched.open_squares, "patched");
         self.write_features(patcher.probed())?;
         Ok(Outcome {
@@ -185,6 +205,27 @@ impl OutcomePlaces<'_> {
             uncertainty,
             counts: written_counts(&patched.mesh),
         })
+    }
+
+    /// Writes the mesh with the colours and texture coordinates of the scan.
+    fn write_mesh(
+        &self,
+        mesh: &TriMesh,
+        origins: &[Option<Point3<f64>>],
+        mut columns: Vec<VertexColumn>,
+    ) -> Result<(), OutcomeError> {
+        let appearance = read_appearance(self.scan, self.unit).unwrap_or_else(|error| {
+            warn!("colours and texture coordinates of the scan are not carried over: {error}");
+            None
+        });
+        let mut texture = None;
+        if let Some(appearance) = appearance {
+            let places = origins.iter().zip(mesh.positions()).map(|(origin, here)| origin.unwrap_or(*here));
+            let places: Vec<_> = places.collect();
+            columns.extend(appearance.colours_at(&places, &Threads).into_iter().flat_map(VertexColumn::of_colours));
+            texture = appearance.texture_on(mesh, &places, &Threads);
+        }
+        write_mesh_with(self.mesh, mesh, &columns, texture.as_ref(), self.unit).map_err(OutcomeError::WriteMesh)
     }
 
     /// Writes the touches and the features of the result, where requested: of the mesh and by the touches as

@@ -7,11 +7,17 @@ use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
 /// Mismatches beyond this are no agreement, in radii.
 pub(in crate::reconstruct) const LARGEST_MISMATCH: f64 = 1.0 / 3.0;
 /// Width of the weights, in radii.
-const WIDTH: f64 = 0.5;
+const WIDTH: f64 = 1.0;
 /// Contacts without agreement take the scan from the field within this, in radii.
 const VETO: f64 = 1.0;
 /// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
 const LARGEST_OFF: f64 = 0.1;
+/// … and where two touched surfaces meet, this.
+const EDGE_OFF: f64 = 1.0 / 30.0;
+/// Contacts face alike on one smooth surface, its engraved lines among them: cosine of the widest angle (26°).
+const BENT: f64 = 0.9;
+/// They are all around where their mean is no farther off than this, in radii of the neighbourhood (of a half disc: 0.42).
+const RINGED: f64 = 0.35;
 /// So far from contacts that agree, in radii, the scan moves along with them …
 const MOVES: f64 = 1.0;
 /// … and from here on not at all.
@@ -55,25 +61,60 @@ impl Agreement {
         (sum * (share * share * (3.0 - 2.0 * share) / weights), share)
     }
 
-    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and all that are nearest do.
-    pub fn holds(&self, contacts: &ContactMap, foot: &Point3<f64>) -> bool {
-        let (mut is_known, mut is_refused) = (false, false);
+    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and all that are nearest do; and
+    /// whether these are on one surface that goes on all around.
+    ///
+    /// - `normal`: of what was touched there.
+    /// - returns: `None` where it is not.
+    pub fn around(&self, contacts: &ContactMap, foot: &Point3<f64>, normal: &Vector3<f64>) -> Option<Surroundings> {
+        let (mut is_known, mut is_refused, mut is_bent) = (false, false, false);
+        let (mut sum, mut count) = (Vector3::zeros(), 0.0);
         contacts.near(foot, RESTS * self.radius, |distance_squared, index| {
             let agrees = self.mismatch[index as usize].is_some();
             is_known |= agrees;
-            is_refused |= !agrees && distance_squared < (VETO * self.radius).powi(2);
+            if distance_squared < (VETO * self.radius).powi(2) {
+                let contact = &contacts.means()[index as usize];
+                is_refused |= !agrees;
+                is_bent |= contact.normal.dot(normal) < BENT;
+                sum += contact.point - foot;
+                count += 1.0;
+            }
         });
-        is_known && !is_refused
+        let is_ringed = count > 0.0 && sum.norm() < RINGED * self.radius * count;
+        let surroundings = if is_ringed && !is_bent { Surroundings::Smooth } else { Surroundings::BentOrOpen };
+        (is_known && !is_refused).then_some(surroundings)
     }
 
-    /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one.
-    ///
-    /// - `is_felt`: a contact is so near that its surface is felt here; farther away the moved scan may rise to where it was.
-    /// - `ends`: what was touched ends here, or may, so that a scan that is deeper may be a blurred edge; else the ball may have lain
-    ///   across it.
-    pub fn is_alike(&self, deeper: f64, is_felt: bool, ends: bool) -> bool {
-        let highest = if is_felt { LARGEST_OFF } else { LARGEST_MISMATCH };
-        let deepest = if ends { LARGEST_OFF } else { LARGEST_MISMATCH };
+    /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one, of which that is the `part`.
+    pub fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
+        let [highest, deepest] = match part {
+            TouchedPart::Edge => [EDGE_OFF; 2],
+            TouchedPart::Border => [LARGEST_OFF; 2],
+            TouchedPart::Beyond => [LARGEST_MISMATCH, LARGEST_OFF],
+            TouchedPart::Middle => [LARGEST_OFF, LARGEST_MISMATCH],
+        };
         (-highest..=deepest).contains(&(deeper / self.radius))
     }
+}
+
+/// What the contacts around a point of the moved scan are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Surroundings {
+    /// on one smooth surface, all around
+    Smooth,
+    /// on surfaces that meet in an edge, or on one side alone
+    BentOrOpen,
+}
+
+/// Where on a touched surface a point is: what a scan may be there that agrees with the contacts around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TouchedPart {
+    /// felt all around: where the scan is deeper, the ball may have lain across it
+    Middle,
+    /// it meets another touched surface: both are known up to there
+    Edge,
+    /// it ends here, or may, and a scan that is deeper may be a blurred edge
+    Border,
+    /// … and no contact is so near that its surface is felt: the moved scan may rise to where it was
+    Beyond,
 }

@@ -410,9 +410,13 @@ impl ContactMap {
 
     /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
+        self.noise_variance(index) + self.sums(index).sigma().systematic().powi(2)
+    }
+
+    /// … by noise alone, m².
+    pub(in crate::reconstruct) fn noise_variance(&self, index: u32) -> f64 {
         let sums = self.sums(index);
-        let (sigma, passes) = (sums.sigma(), sums.passes.count.max(1));
-        sigma.noise * sigma.noise / f64::from(passes) + sigma.systematic().powi(2)
+        sums.sigma().noise.powi(2) / f64::from(sums.passes.count.max(1))
     }
 
     /// Takes a mean out of all queries, or back in; returns whether that is new.

@@ -22,10 +22,18 @@ const FINE: f64 = 0.36;
 const ALONG: f64 = 0.9;
 /// A contact agrees when its mismatch is that around it but for this, in radii: 0.05 mm for a ball of 1.5 mm.
 const AGREES: f64 = 1.0 / 30.0;
-/// … and for so many standard deviations of its own.
+/// … and for so many standard deviations of its own. What is left of it …
 const SIGMAS: f64 = 2.0;
-/// Vertices may scatter by this around the mean of their neighbours, in radii (root mean square): more is noise that touches do better.
-const SCATTER: f64 = 0.005;
+/// … is averaged with this width b, out to here, in radii …
+const AVERAGED: f64 = 0.5;
+const AVERAGED_WITHIN: f64 = 1.2;
+/// … and may be so many standard deviations l …
+const LIMIT: f64 = 2.5;
+/// … and this ε beside, in radii: 4 µm for a ball of 1.5 mm.
+const SLACK: f64 = 0.0025;
+/// Vertices may scatter by this across the straightest line through them, in radii (median): more is noise that touches do better, of 8 µm
+/// for a ball of 1.5 mm. Lines that are engraved are straight.
+const SCATTER: f64 = 0.002;
 /// Around a contact the scatter is looked at within this, in radii.
 const AROUND: f64 = 1.0 / 3.0;
 
@@ -73,22 +81,53 @@ impl KeptDetail {
     }
 }
 
-/// Looks at each contact alone, then beside the others.
+/// Looks at each contact alone, then beside the others: what is left of their mismatches, ρⱼ = δⱼ − u(pⱼ)·nⱼ, must be no more than the noise
+/// of touches. A ball that is bounced by engraved lines is smoothed by its window, so it is averaged first, ρ̄ = Σ gₖ ρₖ / Σ gₖ with
+/// variance Σ gₖ² σₖ² / (Σ gₖ)², gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
+///
+/// Σ wⱼ ρ̄ⱼ² ≤ Σ wⱼ (l² σ̄ⱼ² + ε²).
 fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     let (contacts, radius) = (evidence.contacts, evidence.params.radius);
-    let mut near = BoxQuery::default();
+    let mut fineness = Fineness::new(evidence);
     let alone = contacts.means().iter().map(|contact| {
         let mismatch = if contact.weight > 0.0 { mismatch_of(evidence, contact)? } else { return None };
-        is_fine(evidence, contact, &mut near).then_some(mismatch)
+        fineness.is_fine(contact).then_some(mismatch)
     });
     let mut agreement = Agreement { mismatch: alone.collect(), radius };
-    let agrees = |((contact, mismatch), index): ((&MeanContact, &Option<f64>), u32)| {
-        let mismatch = (*mismatch)?;
-        let around = agreement.displacement(contacts, &contact.point).0.dot(&contact.normal);
-        let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
-        ((around - mismatch).abs() <= may_be_off).then_some(mismatch)
+    let rest = |(contact, mismatch): (&MeanContact, &Option<f64>)| {
+        Some((*mismatch)? - agreement.displacement(contacts, &contact.point).0.dot(&contact.normal))
     };
-    agreement.mismatch = contacts.means().iter().zip(&agreement.mismatch).zip(0..).map(agrees).collect();
+    let rest: Vec<Option<f64>> = contacts.means().iter().zip(&agreement.mismatch).map(rest).collect();
+    // its square, and what it may be, m²
+    let averaged = |contact: &MeanContact| {
+        let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
+        contacts.near(&contact.point, AVERAGED_WITHIN * radius, |distance_squared, index| {
+            if let Some(rest) = rest[index as usize] {
+                let weight = contacts.means()[index as usize].weight
+                    * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
+                sum += weight * rest;
+                variance += weight * weight * contacts.noise_variance(index);
+                weights += weight;
+            }
+        });
+        let noise = LIMIT * LIMIT * variance / (weights * weights) + (SLACK * radius).powi(2);
+        [(sum / weights).powi(2), noise]
+    };
+    let averaged: Vec<[f64; 2]> = contacts.means().iter().map(averaged).collect();
+    let agrees = |(index, mismatch): (u32, &Option<f64>)| {
+        let (mismatch, own) = ((*mismatch)?, rest[index as usize]?);
+        let (mut left, mut noise) = (0.0, 0.0);
+        contacts.near(&contacts.means()[index as usize].point, radius, |_, index| {
+            if rest[index as usize].is_some() {
+                let weight = contacts.means()[index as usize].weight;
+                left += weight * averaged[index as usize][0];
+                noise += weight * averaged[index as usize][1];
+            }
+        });
+        let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
+        (own.abs() <= may_be_off && left <= noise).then_some(mismatch)
+    };
+    agreement.mismatch = (0..).zip(&agreement.mismatch).map(agrees).collect();
     agreement
 }
 
@@ -103,22 +142,59 @@ fn mismatch_of(evidence: &Evidence<'_>, contact: &MeanContact) -> Option<f64> {
     (is_along && distance > (1.0 - LARGEST_MISMATCH) * radius).then_some(distance - radius)
 }
 
-/// Whether the scan around a contact is finer than the tip, and its vertices scatter less than touches do.
-fn is_fine(evidence: &Evidence<'_>, contact: &MeanContact, near: &mut BoxQuery) -> bool {
-    let (scan, radius) = (evidence.scan, evidence.params.radius);
-    let reach = Vector3::repeat(AROUND * radius);
-    evidence.tree.faces_in_box(&(contact.point - reach), &(contact.point + reach), near);
-    let (mut longest, mut sum, mut count) = (0.0f64, 0.0, 0.0);
-    for &face in &near.faces {
-        let [corner, next, _] = scan.corners(face);
-        longest = longest.max((scan.position(next) - scan.position(corner)).norm_squared());
-        // the mean of the neighbours of a corner: each counts once for either face at its edge
-        let star = scan.star(corner);
-        let around = star.iter().flat_map(|&face| scan.corners(face)).filter(|other| *other != corner);
-        let mean = around.fold(Vector3::zeros(), |sum, other| sum + scan.position(other).coords);
-        let off = scan.position(corner).coords - mean / (2.0 * star.len() as f64);
-        sum += off.dot(&scan.normal(face)).powi(2);
-        count += 1.0;
+/// Which parts of the scan are finer than the tip, with vertices that scatter less than touches do.
+struct Fineness<'a> {
+    evidence: &'a Evidence<'a>,
+    /// by vertex, m; not a number: not looked at yet
+    scatter: Vec<f64>,
+    near: BoxQuery,
+    around: Vec<f64>,
+}
+
+impl<'a> Fineness<'a> {
+    fn new(evidence: &'a Evidence<'a>) -> Self {
+        let scatter = vec![f64::NAN; evidence.scan.vertex_slots()];
+        Self { evidence, scatter, near: BoxQuery::default(), around: Vec::new() }
     }
-    count > 0.0 && longest < (2.0 * FINE * radius).powi(2) && sum < count * (SCATTER * radius).powi(2)
+
+    /// Around a contact.
+    fn is_fine(&mut self, contact: &MeanContact) -> bool {
+        let (scan, radius) = (self.evidence.scan, self.evidence.params.radius);
+        let reach = Vector3::repeat(AROUND * radius);
+        self.evidence.tree.faces_in_box(&(contact.point - reach), &(contact.point + reach), &mut self.near);
+        let mut longest = 0.0f64;
+        self.around.clear();
+        for &face in &self.near.faces {
+            let [corner, next, _] = scan.corners(face);
+            longest = longest.max((scan.position(next) - scan.position(corner)).norm_squared());
+            let scatter = &mut self.scatter[corner.0 as usize];
+            if scatter.is_nan() {
+                *scatter = scatter_of(scan, corner);
+            }
+            self.around.push(*scatter);
+        }
+        if self.around.is_empty() || longest >= (2.0 * FINE * radius).powi(2) {
+            return false;
+        }
+        let middle = self.around.len() / 2;
+        *self.around.select_nth_unstable_by(middle, f64::total_cmp).1 < SCATTER * radius
+    }
+}
+
+/// How far a vertex is off the straightest of the lines through it from one neighbour to the one across, along its normal, m.
+fn scatter_of(scan: &TriMesh, vertex: VertexId) -> f64 {
+    let star = scan.star(vertex);
+    let normal = star.iter().map(|&face| scan.double_area_normal(face)).sum::<Vector3<f64>>();
+    let here = scan.position(vertex);
+    let others = || star.iter().flat_map(|&face| scan.corners(face)).filter(|other| *other != vertex);
+    let arms = || others().map(|other| scan.position(other) - here);
+    let off = |arm: Vector3<f64>| {
+        let cosine = |other: &Vector3<f64>| arm.dot(other) / other.norm();
+        let across = arms().min_by(|a, b| cosine(a).total_cmp(&cosine(b)))?;
+        // the foot of the vertex on the line between the two ends
+        let line = across - arm;
+        let foot = arm - line * (arm.dot(&line) / line.norm_squared());
+        Some(foot.dot(&normal).abs() / normal.norm())
+    };
+    arms().filter_map(off).fold(f64::INFINITY, f64::min)
 }

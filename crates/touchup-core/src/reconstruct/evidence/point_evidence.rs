@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::direction;
-use crate::reconstruct::evidence::agreement::Agreement;
+use crate::reconstruct::evidence::agreement::{Agreement, Surroundings, TouchedPart};
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
@@ -319,14 +319,20 @@ impl Evidence<'_> {
     /// Whether the scan has the shape that was touched here, and in more detail.
     fn is_detail(&self, touched: Option<&FieldValue>, scan: &ScanDistance, swept_depth: f64) -> bool {
         let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else { return false };
-        let is_alike = |touched: &FieldValue| {
-            let ends = touched.is_border || touched.is_fan || touched.is_edge;
-            let is_felt = touched.lateral() <= BORDER_SUPPORT * self.params.radius;
-            agreement.is_alike(scan.value - touched.value, is_felt, ends)
+        if scan.value < 0.0 && !agreement.is_alike(-swept_depth.max(0.0), TouchedPart::Border) {
+            return false;
+        }
+        let normal = touched.map_or(scan.normal, |touched| touched.gradient);
+        let Some(around) = agreement.around(self.contacts, &scan.foot, &normal) else { return false };
+        let Some(touched) = touched else { return true };
+        let part = match around {
+            Surroundings::Smooth => TouchedPart::Middle,
+            Surroundings::BentOrOpen if touched.is_edge => TouchedPart::Edge,
+            _ if touched.lateral() > BORDER_SUPPORT * self.params.radius => TouchedPart::Beyond,
+            _ if touched.is_border || touched.is_fan => TouchedPart::Border,
+            Surroundings::BentOrOpen => TouchedPart::Middle,
         };
-        touched.is_none_or(is_alike)
-            && (scan.value >= 0.0 || agreement.is_alike(-swept_depth.max(0.0), true, true))
-            && agreement.holds(self.contacts, &scan.foot)
+        agreement.is_alike(scan.value - touched.value, part)
     }
 
     /// Whether a point out of reach of contacts that is behind the scan is behind the part: a radius nearer to the scan it is in front of a touched

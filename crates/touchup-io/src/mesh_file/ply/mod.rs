@@ -2,17 +2,21 @@
 
 mod body;
 mod header;
+mod painted;
 
 use std::io::{self, Write};
 
 use nalgebra::Point3;
 
+use super::appearance::SoupTexture;
 use super::column::{ColumnValues, VertexColumn};
 use super::defect::Syntax;
 use super::soup::Soup;
 use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
+pub(super) use painted::read_painted;
+use painted::{IMAGE, OF_CORNERS};
 
 /// Names of the list of a face's vertices; both are common.
 const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -139,13 +143,15 @@ fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Resul
     Ok(())
 }
 
-/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices.
+/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices, the texture one of the
+/// faces.
 ///
 /// - `ids`: of the vertices, by which the columns are read.
 pub(super) fn write(
     soup: &Soup,
     ids: &[usize],
     columns: &[VertexColumn],
+    texture: Option<&SoupTexture>,
     unit: &str,
     out: &mut impl Write,
 ) -> io::Result<()> {
@@ -155,11 +161,18 @@ pub(super) fn write(
     };
     let properties: String =
         columns.iter().map(|column| format!("property {} {}\n", kind(&column.values), column.name)).collect();
+    let images: String =
+        texture.iter().flat_map(|texture| &texture.images).map(|name| format!("{IMAGE}{name}\n")).collect();
+    let [coordinates, number] = OF_CORNERS;
+    let of_faces = match texture {
+        None => String::new(),
+        Some(_) => format!("property list uchar float {coordinates}\nproperty uint {number}\n"),
+    };
     write!(
         out,
-        "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\nelement vertex {}\n\
+        "ply\nformat binary_little_endian 1.0\ncomment touchup, unit {unit}, frame O\n{images}element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n{properties}element face {}\n\
-         property list uchar uint vertex_indices\nend_header\n",
+         property list uchar uint vertex_indices\n{of_faces}end_header\n",
         soup.positions.len(),
         soup.faces.len()
     )?;
@@ -170,10 +183,15 @@ pub(super) fn write(
             ColumnValues::Byte(values) => out.write_all(&[values[id]]),
         })?;
     }
-    for corners in &soup.faces {
+    for (at, corners) in soup.faces.iter().enumerate() {
         out.write_all(&[3])?;
         for vertex in corners {
             out.write_all(&vertex.to_le_bytes())?;
+        }
+        if let Some(texture) = texture {
+            out.write_all(&[6])?;
+            texture.corners[at].as_flattened().iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+            out.write_all(&texture.shown[at].to_le_bytes())?;
         }
     }
     Ok(())
