@@ -12,10 +12,10 @@ const WIDTH: f64 = 1.0;
 const VETO: f64 = 1.0;
 /// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
 const LARGEST_OFF: f64 = 0.1;
-/// … and where two touched surfaces meet, this.
+/// … and where two touched surfaces meet, or one ends, and the scan is deeper, this.
 const EDGE_OFF: f64 = 1.0 / 30.0;
 /// Contacts face alike on one smooth surface, its engraved lines among them: cosine of the widest angle (26°).
-const BENT: f64 = 0.9;
+pub(in crate::reconstruct) const BENT: f64 = 0.9;
 /// They are all around where their mean is no farther off than this, in radii of the neighbourhood (of a half disc: 0.42).
 const RINGED: f64 = 0.35;
 /// So far from contacts that agree, in radii, the scan moves along with them …
@@ -89,8 +89,8 @@ impl Agreement {
     pub fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
         let [highest, deepest] = match part {
             TouchedPart::Edge => [EDGE_OFF; 2],
-            TouchedPart::Border => [LARGEST_OFF; 2],
-            TouchedPart::Beyond => [LARGEST_MISMATCH, LARGEST_OFF],
+            TouchedPart::Border => [LARGEST_OFF, EDGE_OFF],
+            TouchedPart::Beyond => [LARGEST_MISMATCH, EDGE_OFF],
             TouchedPart::Middle => [LARGEST_OFF, LARGEST_MISMATCH],
         };
         (-highest..=deepest).contains(&(deeper / self.radius))

@@ -20,8 +20,8 @@ use crate::reconstruct::evidence::point_evidence::Evidence;
 const FINE: f64 = 0.36;
 /// Cosine of the widest angle between the arm to the scan and the normal of the contact.
 const ALONG: f64 = 0.9;
-/// A contact agrees when its mismatch is that around it but for this, in radii: 0.05 mm for a ball of 1.5 mm.
-const AGREES: f64 = 1.0 / 30.0;
+/// A contact agrees when its mismatch is that around it but for this, in radii: 0.075 mm for a ball of 1.5 mm.
+const AGREES: f64 = 0.05;
 /// … and for so many standard deviations of its own. What is left of it …
 const SIGMAS: f64 = 2.0;
 /// … is averaged with this width b, out to here, in radii …
