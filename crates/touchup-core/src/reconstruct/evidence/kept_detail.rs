@@ -28,9 +28,9 @@ const SIGMAS: f64 = 2.0;
 const AVERAGED: f64 = 0.5;
 const AVERAGED_WITHIN: f64 = 1.2;
 /// … and may be so many standard deviations l …
-const LIMIT: f64 = 2.5;
-/// … and this ε beside, in radii: 4 µm for a ball of 1.5 mm.
-const SLACK: f64 = 0.0025;
+const LIMIT: f64 = 3.0;
+/// … and this ε beside, in radii: 4.5 µm for a ball of 1.5 mm.
+const SLACK: f64 = 0.003;
 /// Vertices may scatter by this across the straightest line through them, in radii (median): more is noise that touches do better, of 8 µm
 /// for a ball of 1.5 mm. Lines that are engraved are straight.
 const SCATTER: f64 = 0.002;
