@@ -13,12 +13,12 @@ mod sliding;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, noisy, percentile, resident};
+use sliding::{SCAN_NOISE, percentile, resident};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
-use touchup::sim::wavy::{RADIUS, STIFFNESS, plate};
+use touchup::sim::wavy::{RADIUS, STIFFNESS, noisy_slide_on, plate};
 
 /// Edge lengths, in radii of the tip.
 const EDGES: [f64; 6] = [1.0 / 30.0, 0.1, 0.25, 0.5, 1.0, 2.0];
@@ -44,7 +44,7 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
     let (mut times, mut ages, mut moved, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
-        let sample = noisy(side, i, 0.8 * side);
+        let sample = noisy_slide_on(side, i, 0.8 * side);
         if is_live {
             // a thread that waits busily would slow the other down where both share a core
             std::thread::sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));

@@ -13,12 +13,12 @@ mod sliding;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, noisy, percentile, resident};
+use sliding::{SCAN_NOISE, percentile, resident};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
 use touchup::reconstruct::PatcherParams;
-use touchup::sim::wavy::{RADIUS, SIDE, STEP_NS, STIFFNESS, wavy_plate};
+use touchup::sim::wavy::{RADIUS, SIDE, STEP_NS, STIFFNESS, noisy_slide_on, wavy_plate};
 
 /// Width of the raster, m: passed over each 4.6 minutes.
 const WIDTH: f64 = 40e-3;
@@ -41,7 +41,7 @@ fn main() {
     println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
     let (mut times, mut ages, mut late, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
-        let sample = noisy(SIDE, i, WIDTH);
+        let sample = noisy_slide_on(SIDE, i, WIDTH);
         let due = Duration::from_millis(if is_fast { 0 } else { i as u64 });
         // a thread that waits busily would slow the other down where both share a core
         std::thread::sleep(due.saturating_sub(begun.elapsed()));

@@ -2,7 +2,7 @@
 //! where it fails.
 
 use super::convergence::{Convergence, Rule};
-use super::cost::Cost;
+use super::cost::{Cost, RecordingCost};
 use super::coverage::Coverage;
 use super::extremes::Extremes;
 use super::figure::{Table, TableCell};
@@ -20,8 +20,8 @@ pub fn advice(scans: &WholeScan, stability: Option<&Stability>, cost: Option<&Co
     let mut answer = format!(
         "up to {us} µs per sample: at 1 kHz {percent} % of one core, which keeps up with {rate} samples per second"
     );
-    if let Some(size) = cost.and_then(|cost| cost.sizes.last()) {
-        let answer_us = size.default_larger.time_ns.median * 1e-3;
+    if let Some(recording) = cost.and_then(|cost| cost.by_faces.last()) {
+        let answer_us = recording.push.median as f64 * 1e-3;
         answer += &format!("; the haptic update answers in {} µs, the patch follows", three_digits(answer_us));
     }
     let mut rows = vec![["method and region".to_owned(), one_or_each(&best), errors(&best), answer]];
@@ -200,13 +200,12 @@ pub fn of_extremes(measured: &Extremes) -> Vec<String> {
 
 /// The sensor rate that one core keeps up with.
 pub fn of_cost(measured: &Cost) -> Vec<String> {
-    let Some(size) = measured.sizes.last() else { return Vec::new() };
-    let push = size.default_larger.time_ns;
-    let [us, p90, percent] = [push.median * 1e-3, push.p90 * 1e-3, push.median * 1e-4].map(three_digits);
+    let Some(RecordingCost { faces, edge, push, .. }) = measured.by_faces.last() else { return Vec::new() };
+    let [us, p999, percent] = [push.median as f64 * 1e-3, push.p999 as f64 * 1e-3, push.median as f64 * 1e-4];
+    let [us, p999, percent, edge_mm] = [us, p999, percent, edge * 1e3].map(three_digits);
     let mut text = format!(
-        "Rate: on {} faces one push of the default scene, its patch aside, takes {us} µs (p90 {p90} µs); at 1 kHz that is \
-         {percent} % of one core.",
-        size.faces
+        "Rate: on {faces} faces with edges of {edge_mm} mm one push of the default scene, its patch made at the end, takes {us} µs \
+         (p99.9 {p999} µs); at 1 kHz that is {percent} % of one core."
     );
     if let Some(speed) = measured.slowest_replay_per_s() {
         text += &format!(" A recording is replayed with at least {} samples per second.", three_digits(speed));
@@ -226,7 +225,7 @@ pub fn of_peers(measured: &Peers) -> Vec<String> {
     };
     let ratios: Vec<String> = measured.sizes.iter().filter_map(at_size).collect();
     let promise = if measured.holds() { "Both promises hold" } else { "A promise is MISSED" };
-    vec![format!("Against peers: {}. {promise}: 100 times, and faster than a query.", ratios.join("; "))]
+    vec![format!("Against libraries from PyPI: {}. {promise}: 100 times, and faster than a query.", ratios.join("; "))]
 }
 
 #[cfg(test)]

@@ -18,6 +18,8 @@ pub const FORCE: f64 = 2.0;
 pub const STEP_NS: i64 = 1_000_000;
 /// The part lies this much below the scan, m: every contact moves vertices.
 const DEPTH: f64 = 0.05e-3;
+/// Noise of the tracker on each axis, of [`noisy_slide_on`], m.
+const NOISE: f64 = 0.03e-3;
 /// m/s
 const SPEED: f64 = 0.05;
 /// Distance between two lines of the raster, m.
@@ -76,6 +78,19 @@ pub fn slide_on(side: f64, i: usize, width: f64) -> Sample {
     let reported = contact + normal * (RADIUS - FORCE / STIFFNESS);
     let wrench = Wrench { force: normal * FORCE, torque: Vector3::zeros() };
     Sample { stamp_ns: i as i64 * STEP_NS, pose_ot: Isometry3::translation(reported.x, reported.y, reported.z), wrench }
+}
+
+/// Sample `i` of [`slide_on`] with evenly spread noise of the tracker, the same each time.
+pub fn noisy_slide_on(side: f64, i: usize, width: f64) -> Sample {
+    let mut sample = slide_on(side, i, width);
+    let mut state = i as u64;
+    let mut draw = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
+    };
+    draw();
+    sample.pose_ot.translation.vector += Vector3::new(draw(), draw(), draw());
+    sample
 }
 
 /// Where the ball touches the part at sample `i` of [`slide_on`], m, and the outward normal there.

@@ -1,77 +1,116 @@
 //! The chapter of the report.
 
 use super::{
-    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, LogLaw, PartCost, PerSample, READING, ReplaySpeed, SizeCost,
+    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, PartCost, READING, RecordingCost, ReplaySpeed, SizeCost,
 };
+use crate::number::three_digits;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
+use touchup_sim::wavy::RADIUS;
 
 /// A time within this of the law is no more than the law.
 const NO_MORE: f64 = 1.05;
 /// A difference of whole pushes below this share of a push cannot be distinguished from noise.
 const DISCERNIBLE: f64 = 0.02;
+/// How recordings are refined, below their figures.
+const HOW: &str = "The default scene over a recording at 1 kHz: quantiles of the pushes, and all from the scan in memory to the mesh with \
+                   its patch, divided by the samples. parry3d: the median of its tree of boxes brought up to date after the vertices \
+                   within one radius of the tip moved, and of one closest face; what finds and moves them is not counted, and neither is \
+                   the rest of a push.";
 
 impl Cost {
     /// As it is printed.
     pub fn chapter(&self) -> Chapter {
-        let texts = [self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()];
+        let texts = [self.recording_text(), self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()];
         let text = texts.into_iter().flatten().chain([self.count_text()]).collect();
-        Chapter::of("Cost of each stage", text, vec![self.size_figure()], self.tables())
+        let figures = vec![self.edge_figure(), self.faces_figure(), self.cheapest_figure()];
+        Chapter::of("Cost of each stage", text, figures, self.tables())
     }
 
-    fn size_figure(&self) -> Figure {
+    fn edge_figure(&self) -> Figure {
+        let axis = Axis::log("edge length of the scan, mm", "edge_mm");
+        let curves = recording_curves(&self.by_edge, "", |recording| recording.edge * 1e3);
+        let faces = self.by_edge.first().map_or(0, |recording| recording.faces);
+        recording_figure("push_time_by_edge", axis, curves)
+            .title(format!("A recording refined, against the edge length of the scan; {faces} faces"))
+            .caption(format!("Edges of a thirtieth to two radii of the tip, {:.1} mm. {HOW}", RADIUS * 1e3))
+    }
+
+    fn faces_figure(&self) -> Figure {
+        let axis = Axis::log("faces of the scan", "faces");
+        let of_edge = |recordings: &[RecordingCost]| {
+            let edge = format!(", {:.2} mm", recordings.first().map_or(0.0, |recording| recording.edge * 1e3));
+            recording_curves(recordings, &edge, |recording| recording.faces as f64)
+        };
+        let curves = self.by_faces.chunk_by(|a, b| a.edge == b.edge).flat_map(of_edge).collect();
+        recording_figure("push_time_by_faces", axis, curves)
+            .title("A recording refined, against the faces of the scan, on edges of two lengths")
+            .caption(HOW)
+    }
+
+    fn cheapest_figure(&self) -> Figure {
         let curve = |name: &str, stroke: LineStroke, time: &dyn Fn(&SizeCost) -> Spread| {
             let marks = self.sizes.iter().map(|size| Mark::at(size.faces as f64, time(size).times(1e-3)));
             Series::new(name, stroke, marks)
         };
-        let series =
-            |name, time: fn(&SizeCost) -> &PerSample| curve(name, LineStroke::Joined, &|size| time(size).time_ns);
-        let law = |name, law: Option<LogLaw>| {
-            law.map(|law| curve(name, LineStroke::Dashed, &|size| law.at(size.faces).into()))
-        };
         let mut curves = vec![
-            series("hand-written loop", |size| &size.minimal),
-            series("cheapest scene", |size| &size.barest),
-            series("default scene, scan of 1 mm edges", |size| &size.default_larger),
-            series("default scene, scan of 0.3 m", |size| &size.default_finer),
+            curve("hand-written loop", LineStroke::Joined, &|size| size.minimal.time_ns),
+            curve("the loop, keeping", LineStroke::Joined, &|size| size.keeping.time_ns),
+            curve("cheapest scene", LineStroke::Joined, &|size| size.barest.time_ns),
         ];
-        curves.extend(law("law of the cheapest scene", self.barest_law));
-        curves.extend(law("law of the default scene, 1 mm edges", self.default_law));
-        Figure::of("push_time_by_faces", Drawing::Curves(curves))
-            .title("One push against the size of the scan")
+        if let Some(law) = self.barest_law {
+            curves.push(curve("law of the cheapest scene", LineStroke::Dashed, &|size| law.at(size.faces).into()));
+        }
+        Figure::of("cheapest_push_by_faces", Drawing::Curves(curves))
+            .title("The cheapest push against the size of the scan")
             .axes(Axis::log("faces of the scan", "faces"), Axis::log("time of one push, µs", "push_us"))
             .caption(format!(
                 "Median and p10–p90 of blocks of samples, all cases in turns. Dashed: t = a + b ln F, fitted to the \
-                 scans of up to {LAW_UP_TO} faces. What lies above it is the cache; where a scan of one size gets \
-                 finer, more vertices move with each touch.",
+                 scans of up to {LAW_UP_TO} faces. What lies above it is the cache.",
             ))
+    }
+
+    fn recording_text(&self) -> Option<String> {
+        let all = || self.by_edge.iter().chain(&self.by_faces);
+        let ends = |of: fn(&RecordingCost) -> f64| {
+            let order = |a: &&RecordingCost, b: &&RecordingCost| of(a).total_cmp(&of(b));
+            let said = |recording: &RecordingCost| {
+                let value = three_digits(of(recording));
+                (value, format!("{} faces, edges of {:.2} mm", recording.faces, recording.edge * 1e3))
+            };
+            all().min_by(order).map(said).zip(all().max_by(order).map(said))
+        };
+        let ((least, fastest), (most, slowest)) = ends(|recording| recording.push.median as f64 * 1e-3)?;
+        let (_, (p999, longest)) = ends(|recording| recording.push.p999 as f64 * 1e-3)?;
+        let ((share, coarse), (times, fine)) =
+            ends(|recording| recording.peer.median as f64 / recording.push.median.max(1) as f64)?;
+        Some(format!(
+            "A push of the default scene, its patch made at the end, takes {least} µs ({fastest}) to {most} µs ({slowest}) in the median \
+             and at most {p999} µs in p99.9 ({longest}). The index of parry3d alone, brought up to date after the vertices within one \
+             radius of the tip were moved and asked for one closest face, takes {share} ({coarse}) to {times} times ({fine}) a whole push; \
+             what finds and moves these vertices is not counted, and a push does more: it filters, gates, solves the dynamics, carves and \
+             guards. The libraries from PyPI are measured with --peers.",
+        ))
     }
 
     fn size_text(&self) -> Option<String> {
         let (first, last) = (self.sizes.first()?, self.sizes.last()?);
         let more = last.faces as f64 / first.faces as f64;
-        let grown = |law: Option<LogLaw>, time: fn(&SizeCost) -> &PerSample| {
-            let (from, to) = (time(first).time_ns.median, time(last).time_ns.median);
-            let expected = law.map_or(String::new(), |law| {
-                let times = to / law.at(last.faces);
-                let verdict = if times <= NO_MORE {
-                    "no more than the logarithm says".to_owned()
-                } else {
-                    format!("beyond the logarithm, with {:.0} MB of mesh and tree", last.bytes() * 1e-6)
-                };
-                format!(" ({times:.2} times what the logarithmic law of the small scans foretells: {verdict})")
-            });
-            format!("{:.2} µs instead of {:.2} µs{expected}", to * 1e-3, from * 1e-3)
-        };
-        let barest = grown(self.barest_law, |size| &size.barest);
-        let default = grown(self.default_law, |size| &size.default_larger);
-        let [[few, short], [many, long]] =
-            [first, last].map(|size| [size.moved_finer, size.default_finer.time_ns.median * 1e-3]);
+        let (from, to) = (first.barest.time_ns.median, last.barest.time_ns.median);
+        let expected = self.barest_law.map_or(String::new(), |law| {
+            let times = to / law.at(last.faces);
+            let verdict = if times <= NO_MORE {
+                "no more than the logarithm says".to_owned()
+            } else {
+                format!("beyond the logarithm, with {:.0} MB of mesh and tree", last.bytes() * 1e-6)
+            };
+            format!(" ({times:.2} times what the logarithmic law of the small scans foretells: {verdict})")
+        });
         Some(format!(
-            "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {barest}; the default scene, with \
-             edges of 1 mm on both, {default}. A scan that grows finer and not larger is another matter: the region that follows \
-             the ball then holds {many:.0} vertices instead of {few:.0}, and the default scene takes {long:.1} µs instead of \
-             {short:.1} µs.",
-            last.faces, first.faces
+            "On a scan of {more:.0} times the faces ({} instead of {}) the cheapest scene takes {:.2} µs instead of {:.2} µs{expected}.",
+            last.faces,
+            first.faces,
+            to * 1e-3,
+            from * 1e-3
         ))
     }
 
@@ -126,7 +165,8 @@ impl Cost {
     }
 
     fn count_text(&self) -> String {
-        let pushes = self.sizes.iter().flat_map(|size| [&size.barest, &size.default_finer, &size.default_larger]);
+        let default = self.parts.iter().filter(|part| part.is_default).map(|part| &part.with);
+        let pushes = self.sizes.iter().map(|size| &size.barest).chain(default);
         let Some(most) = pushes.filter_map(|push| push.allocations).max_by(f64::total_cmp) else {
             return "This program does not count allocations, so their columns are empty.".to_owned();
         };
@@ -136,24 +176,20 @@ impl Cost {
 
     fn tables(&self) -> Vec<Table> {
         vec![
-            Table::of("push_by_faces", "A push, by size of the scan", &self.sizes)
+            recording_table("recordings_by_edge", "A recording refined, by edge length of the scan", &self.by_edge),
+            recording_table("recordings_by_faces", "A recording refined, by faces of the scan", &self.by_faces),
+            Table::of("push_by_faces", "The cheapest push, by size of the scan", &self.sizes)
                 .column("faces", |size| size.faces)
                 .column("hand-written loop, ns", |size| size.minimal.time_ns)
                 .column("cheapest scene, ns", |size| size.barest.time_ns)
                 .column("cheapest / loop", |size| size.barest_to_minimal)
                 .column("loop that keeps, ns", |size| size.keeping.time_ns)
                 .column("cheapest / keeping loop", |size| size.barest_to_keeping)
-                .column("default, 1 mm edges, ns", |size| size.default_larger.time_ns)
-                .column("default, 0.3 m, ns", |size| size.default_finer.time_ns)
-                .column("vertices moved at 0.3 m", |size| size.moved_finer)
-                .column("allocations", |size| size.default_larger.allocations)
+                .column("allocations", |size| size.barest.allocations)
                 .column("mesh, bytes/face", |size| size.mesh_bytes_per_face)
                 .column("tree, bytes/face", |size| size.tree_bytes_per_face)
                 .column("tree built, ms", |size| size.tree_build_ms)
-                .caption(
-                    "Cheapest scene and hand-written loop on a plate of 0.3 m; the default scene without patch, on a \
-                     plate of edges of 1 mm and on the one of 0.3 m. Memory is counted from what mesh and tree own.",
-                ),
+                .caption("On a plate of 0.3 m. Memory is counted from what mesh and tree own."),
             Table::of("push_by_part", "A push with and without each optional part", &self.parts)
                 .column("part", |part| part.part.as_str())
                 .column("faces", |part| part.faces)
@@ -193,4 +229,45 @@ impl Cost {
                 .caption("From the MCAP file to the moved mesh: decoding, synchronising, pushing."),
         ]
     }
+}
+
+/// Pushes, the whole, and the peer, against `x`.
+///
+/// - `more`: behind each name.
+fn recording_curves(recordings: &[RecordingCost], more: &str, x: impl Fn(&RecordingCost) -> f64) -> Vec<Series> {
+    let curve = |name: &str, stroke, time_us: &dyn Fn(&RecordingCost) -> f64| {
+        let marks = recordings.iter().map(|recording| Mark::at(x(recording), time_us(recording)));
+        Series::new(format!("{name}{more}"), stroke, marks)
+    };
+    let us = |ns: u64| ns as f64 * 1e-3;
+    vec![
+        curve("push, median", LineStroke::Joined, &|recording| us(recording.push.median)),
+        curve("push, p99", LineStroke::Joined, &|recording| us(recording.push.p99)),
+        curve("push, p99.9", LineStroke::Joined, &|recording| us(recording.push.p999)),
+        curve("end to end", LineStroke::Joined, &|recording| recording.whole_us),
+        curve("index of parry3d", LineStroke::Joined, &|recording| us(recording.peer.median)),
+    ]
+}
+
+fn recording_figure(id: &str, x: Axis, curves: Vec<Series>) -> Figure {
+    Figure::of(id, Drawing::Curves(curves)).axes(x, Axis::log("time per sample, µs", "sample_us"))
+}
+
+fn recording_table(id: &str, title: &str, recordings: &[RecordingCost]) -> Table {
+    let us = |ns: u64| ns as f64 * 1e-3;
+    Table::of(id, title, recordings)
+        .column("edge, mm", |recording| recording.edge * 1e3)
+        .column("faces", |recording| recording.faces)
+        .column("samples", |recording| recording.samples)
+        .column("push, median, µs", |recording| us(recording.push.median))
+        .column("push, p99, µs", |recording| us(recording.push.p99))
+        .column("push, p99.9, µs", |recording| us(recording.push.p999))
+        .column("until the first push, ms", |recording| recording.begin_ms)
+        .column("patch at the end, ms", |recording| recording.patch_ms)
+        .column("end to end, µs per sample", |recording| recording.whole_us)
+        .column("parry3d, median, µs", |recording| us(recording.peer.median))
+        .column("parry3d, p99, µs", |recording| us(recording.peer.p99))
+        .column("parry3d, p99.9, µs", |recording| us(recording.peer.p999))
+        .column("vertices moved for parry3d", |recording| recording.peer_moves)
+        .caption(HOW)
 }

@@ -13,7 +13,12 @@ const STEP: f64 = 1e-3;
 /// By which boxes are made wider where they are planned: far more than a sample moves, m.
 const MARGIN: f64 = 2e-5;
 /// Search radius of a contact, m.
-const REACH: f64 = 0.01;
+pub(super) const REACH: f64 = 0.01;
+
+/// Share of the mismatch that goes with each sample.
+pub(super) fn gain() -> f64 {
+    -(-RELAXATION * STEP).exp_m1()
+}
 
 /// A mesh that follows the ball of [`touchup_sim::wavy`], and nothing else.
 #[derive(Clone, Debug)]
@@ -38,7 +43,7 @@ impl MinimalLoop {
     /// Builds the tree.
     pub fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
-        Self { mesh, tree, gain: -(-RELAXATION * STEP).exp_m1(), faces: Vec::new(), plan: None }
+        Self { mesh, tree, gain: gain(), faces: Vec::new(), plan: None }
     }
 
     /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up to date, and what is near.

@@ -3,7 +3,9 @@
 mod chapter;
 mod log_law;
 mod minimal;
+mod parry;
 mod pushes;
+mod recordings;
 mod replay;
 mod stages;
 mod turns;
@@ -12,7 +14,9 @@ use super::Effort;
 use super::error::Measured;
 pub use log_law::LogLaw;
 pub use minimal::MinimalLoop;
+pub use parry::ParryLoop;
 pub use pushes::{BAREST, PartCost, SizeCost};
+pub use recordings::RecordingCost;
 pub use replay::{READING, ReplaySpeed};
 pub use stages::{SeldomCost, StageCost};
 pub use turns::PerSample;
@@ -30,12 +34,14 @@ pub const LAW_UP_TO: usize = 105_000;
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cost {
-    /// whole pushes, by size of the scan, rising
+    /// recordings refined by the default scene, on scans of one size
+    pub by_edge: Vec<RecordingCost>,
+    /// … and on scans of equal edges, their faces rising
+    pub by_faces: Vec<RecordingCost>,
+    /// the cheapest push, by size of the scan, rising
     pub sizes: Vec<SizeCost>,
     /// t = a + b ln F of the cheapest scene, of scans of 10k to 100k faces
     pub barest_law: Option<LogLaw>,
-    /// … and of the default scene on scans of equal density
-    pub default_law: Option<LogLaw>,
     /// whole pushes with and without each optional part
     pub parts: Vec<PartCost>,
     /// stages by themselves
@@ -51,6 +57,8 @@ pub struct Cost {
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError).
 pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
+    let by_edge = recordings::by_edge(effort, progress)?;
+    let by_faces = recordings::by_faces(effort, progress)?;
     let sizes: &[usize] = effort.choose(
         &[10_000, 30_000, 100_000],
         &[10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000],
@@ -58,7 +66,7 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     let timing = effort
         .choose(Timing { warm: 3_000, blocks: 15, block: 400 }, Timing { warm: 20_000, blocks: 40, block: 1_000 });
     let at_size = |&faces: &usize| {
-        progress(&format!("cost: a push on {faces} faces"));
+        progress(&format!("cost: the cheapest push on {faces} faces"));
         pushes::size_cost(faces, timing)
     };
     let sizes = sizes.iter().map(at_size).collect::<Result<Vec<_>, _>>()?;
@@ -79,17 +87,7 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     progress("cost: replay on 1,000,000 faces");
     let mut replays = replay::replay_speeds((1_000_000, pushes::side_of(1_000_000)), count, repeats)?;
     replays.extend(replay::replay_speeds((1_000_000, touchup_sim::wavy::SIDE), count, repeats)?);
-    let law = |time: fn(&SizeCost) -> &PerSample| {
-        let known = sizes.iter().filter(|size| size.faces <= LAW_UP_TO);
-        LogLaw::fit(&known.map(|size| (size.faces, time(size).time_ns.median)).collect::<Vec<_>>())
-    };
-    Ok(Cost {
-        barest_law: law(|size| &size.barest),
-        default_law: law(|size| &size.default_larger),
-        sizes,
-        parts,
-        stages,
-        seldom,
-        replays,
-    })
+    let known = sizes.iter().filter(|size| size.faces <= LAW_UP_TO);
+    let known: Vec<_> = known.map(|size| (size.faces, size.barest.time_ns.median)).collect();
+    Ok(Cost { by_edge, by_faces, barest_law: LogLaw::fit(&known), sizes, parts, stages, seldom, replays })
 }

@@ -1,5 +1,5 @@
-//! What a push costs: on scans of different size for the hand-written loop, the cheapest and the default scene, and with and without
-//! each optional part.
+//! What a push of the haptic update costs: on scans of different size for the hand-written loop and the cheapest scene, and with and
+//! without each optional part of the default one.
 
 use std::ops::{Div, Sub};
 
@@ -18,7 +18,7 @@ pub const BAREST: &str = "{ refine: { roi_mm: 0, beta_per_n2_s: 0 }, sync: off, 
                           guard: off, patch: off, uncertainty: off }\n";
 
 /// Length of the short edges of a scan that grows with its faces, m.
-const EDGE: f64 = 1e-3;
+pub(super) const EDGE: f64 = 1e-3;
 
 /// On a scan of so many faces.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,12 +35,6 @@ pub struct SizeCost {
     pub barest_to_minimal: Spread,
     /// … and as the loop that keeps
     pub barest_to_keeping: Spread,
-    /// the default scene without its patch, on the same: the finer the scan, the more vertices move with a touch
-    pub default_finer: PerSample,
-    /// vertices that a touch moves there, mean
-    pub moved_finer: f64,
-    /// the default scene without its patch on a plate of edges of 1 mm, as large as the faces make it
-    pub default_larger: PerSample,
     /// memory of the mesh of the cheapest scene, bytes per face
     pub mesh_bytes_per_face: f64,
     /// … and of its tree
@@ -83,26 +77,14 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Measured<SizeCost> {
     drop(tree);
     let mut barest = refiner_of(&Scene::from_yaml(BAREST)?, mesh.clone())?;
     let footprint = barest.footprint();
-    let mut default = refiner_of(&Scene::default(), mesh.clone())?;
     let mut keeping = MinimalLoop::keeping(mesh.clone());
     let mut minimal = MinimalLoop::new(mesh);
-    let mut moved_finer = 0;
     let mut cases = [
         TimedCase::each("hand-written loop", &samples, |sample| Ok(minimal.push(sample))),
         TimedCase::each("the loop, keeping", &samples, |sample| Ok(keeping.push(sample))),
         TimedCase::each("cheapest scene", &samples, |sample| Ok(barest.push(sample).map(drop)?)),
-        TimedCase::each("default scene", &samples, |sample| {
-            default.push(sample)?;
-            moved_finer += default.moved_vertices().len();
-            Ok(())
-        }),
     ];
     let timed = in_turns(&mut cases, timing)?;
-    drop(cases);
-    let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
-    let mut larger = refiner_of(&Scene::default(), mesh)?;
-    let case = TimedCase::each("default scene", &samples, |sample| Ok(larger.push(sample).map(drop)?));
-    let default_larger = in_turns(&mut [case], timing)?[0].per_sample()?;
     let per_face = |bytes: usize| bytes as f64 / faces.max(1) as f64;
     Ok(SizeCost {
         faces,
@@ -111,9 +93,6 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Measured<SizeCost> {
         barest: timed[2].per_sample()?,
         barest_to_minimal: by_block(&timed[2], &timed[0], f64::div)?,
         barest_to_keeping: by_block(&timed[2], &timed[1], f64::div)?,
-        default_finer: timed[3].per_sample()?,
-        moved_finer: moved_finer as f64 / timing.samples() as f64,
-        default_larger,
         mesh_bytes_per_face: per_face(footprint.mesh),
         tree_bytes_per_face: per_face(footprint.tree),
         tree_build_ms: tree_build_s * 1e3,

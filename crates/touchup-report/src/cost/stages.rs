@@ -49,7 +49,7 @@ pub struct SeldomCost {
 const RENEWAL: usize = 8;
 
 /// The point that the ball touches with.
-fn touching(sample: &Sample) -> Point3<f64> {
+pub(super) fn touching(sample: &Sample) -> Point3<f64> {
     let force = &sample.wrench.force;
     Point3::from(sample.pose_ot.translation.vector) + force / STIFFNESS - force.normalize() * RADIUS
 }
