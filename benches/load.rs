@@ -10,6 +10,7 @@ use nalgebra::Point3;
 use tempfile::TempDir;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::mesh::{FaceTree, TriMesh, repair};
+use touchup::threads::Threads;
 
 /// Quads of 1 mm in a row, and rows, of a wavy sheet: a million triangles …
 const MILLION: [u32; 2] = [1000, 500];
@@ -82,7 +83,10 @@ fn load(bencher: divan::Bencher, name: &str) {
 #[divan::bench(args = ["single.ply", "binary.stl"], sample_count = 10)]
 fn load_to_tree(bencher: divan::Bencher, name: &str) {
     let (_folder, path) = file(name, FIVE_MILLION);
-    bencher.bench_local(|| FaceTree::new(&read_mesh(black_box(&path), MeshUnit::Metre).expect("read before").mesh));
+    bencher.bench_local(|| {
+        let read = read_mesh(black_box(&path), MeshUnit::Metre).expect("read before");
+        FaceTree::new_by(&read.mesh, &Threads)
+    });
 }
 
 /// The part of it that checks, welds, orients and builds the adjacency.

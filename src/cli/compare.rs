@@ -111,7 +111,7 @@ struct PlacedMesh {
 
 impl PlacedMesh {
     fn new(mesh: TriMesh) -> Self {
-        Self { tree: FaceTree::new(&mesh), mesh }
+        Self { tree: FaceTree::new_by(&mesh, &Threads), mesh }
     }
 
     fn shape(&self) -> IndexedMesh<'_> {

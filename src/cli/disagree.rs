@@ -17,6 +17,7 @@ use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
 use crate::io::touches_file::read_touches;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::scan::read_scan;
+use crate::threads::Threads;
 
 #[derive(Debug, Args)]
 pub(super) struct DisagreeArguments {
@@ -133,7 +134,7 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
     drop(reading);
 
     let measuring = WorkProgress::stage("compare");
-    let [scan_tree, refined_tree] = [&scan, &refined].map(FaceTree::new);
+    let [scan_tree, refined_tree] = [&scan, &refined].map(|mesh| FaceTree::new_by(mesh, &Threads));
     let shape = IndexedMesh { mesh: &refined, tree: &refined_tree };
     let found =
         disagreement(IndexedMesh { mesh: &scan, tree: &scan_tree }, &RefinedShape { shape, known: &known }, &touches)?;

@@ -18,6 +18,7 @@ use crate::mesh::FaceTree;
 use crate::replay::{Recording, each_sample, marker_filter};
 use crate::scan::read_scan;
 use crate::stylus::{ContactEstimator, ContactEstimatorParams};
+use crate::threads::Threads;
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
@@ -113,7 +114,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     )?;
     let monitor = monitor.into_inner();
     let wrench_offset = monitor.clock_offset().map(|found| WrenchOffset::of(&found, &scene.sync_params()));
-    let findings = monitor.findings(&scan, &FaceTree::new(&scan));
+    let findings = monitor.findings(&scan, &FaceTree::new_by(&scan, &Threads));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
     let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_offset, findings };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;

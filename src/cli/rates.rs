@@ -10,6 +10,7 @@ use crate::live::{Ended, Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Q
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::PatcherParams;
 use crate::stylus::Sample;
+use crate::threads::Threads;
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 18;
@@ -55,7 +56,7 @@ impl Rates {
     ) -> Result<Self, LiveError> {
         let (mut renewal, mut real_time) = (Renewal::AtEnd, None);
         if is_live {
-            let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
+            let scan = Arc::new((mesh.clone(), FaceTree::new_by(&mesh, &Threads)));
             let scan_bytes = scan.0.bytes() + scan.1.bytes();
             renewal = Renewal::Beside { scan, pace: Pace::default(), room: ROOM, gate: Gate::default() };
             real_time = Some(RealTime { scan_bytes, begun: None, behind: Latencies::new() });

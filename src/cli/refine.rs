@@ -30,6 +30,7 @@ use crate::scan::{Scan, read_scan};
 use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
+use crate::threads::Threads;
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
@@ -320,7 +321,7 @@ impl RefineArguments {
         )?;
         change_strokes(i64::MAX, &mut rates);
         let monitor = monitor.into_inner();
-        let tree = FaceTree::new(&as_scanned);
+        let tree = FaceTree::new_by(&as_scanned, &Threads);
         let findings = self.doubt(&monitor, &as_scanned, &tree, pushes.accepted)?;
         let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &tree)));
         drop(tree);

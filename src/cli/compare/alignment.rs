@@ -162,7 +162,7 @@ pub(super) fn aligned_by_features(
     json: bool,
 ) -> Aligned {
     let _aligning = WorkProgress::stage("align by features");
-    let own = detect(mesh, &FaceTree::new(mesh), &[]).features;
+    let own = detect(mesh, &FaceTree::new_by(mesh, &Threads), &[]).features;
     let theirs = detect(truth.mesh, truth.tree, &[]).features;
     let points = spread(mesh, POINTS_EACH, seed);
     let surfaces = Surfaces { points: &points, target: truth.mesh, tree: truth.tree };

@@ -19,6 +19,7 @@ use crate::mesh::{FaceHit, FaceTree, TriMesh};
 use crate::probing::arm::{ArmState, Observer, StopRequest};
 use crate::probing::execute::{ProbedTouch, Progress, StaticWorld, World};
 use crate::stylus::{Message, Sample, StampedPose, WrenchFrame};
+use crate::threads::Threads;
 
 /// Room reserved for new faces.
 const ROOM: usize = 1 << 16;
@@ -41,7 +42,7 @@ impl FollowingMesh {
         let params = ready.scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
         // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
         let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
-        let scan = Arc::new((ready.mesh.clone(), FaceTree::new(&ready.mesh)));
+        let scan = Arc::new((ready.mesh.clone(), FaceTree::new_by(&ready.mesh, &Threads)));
         let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
         let engine = Engine::new(ready.mesh.clone(), params, ready.scene.patcher_params(), renewal)?;
         Ok(Self { engine, pose_ob: ready.cell.pose_bo.inverse(), pose: None, failed: None })

@@ -319,8 +319,8 @@ impl DeformableMesh {
 
     /// Puts the region at a share of its displacement.
     fn place(&mut self, roi: &Roi, share: f64) {
-        for (i, &vertex) in roi.vertices.iter().enumerate() {
-            self.mesh.set_position(vertex, self.before[i] + self.displacements[i] * share);
+        for ((&vertex, before), displacement) in roi.vertices.iter().zip(&self.before).zip(&self.displacements) {
+            self.mesh.set_position(vertex, before + displacement * share);
         }
     }
 }

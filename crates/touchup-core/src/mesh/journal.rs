@@ -34,7 +34,8 @@ impl Journal {
         Self { vertices: IdSet::with_slots(vertices), faces: IdSet::with_slots(faces), edits: 0 }
     }
 
-    #[inline]
+    /// Never inlined: most meshes are not watched.
+    #[inline(never)]
     pub fn note_vertex(&mut self, vertex: u32) {
         self.edits += 1;
         self.vertices.insert(vertex);

@@ -22,9 +22,21 @@ impl Aabb {
         }
     }
 
+    /// Around some faces.
+    #[inline]
+    pub fn around(mesh: &TriMesh, origin: &Point3<f64>, faces: impl Iterator<Item = FaceId>) -> Self {
+        let mut bounds = Self::EMPTY;
+        let mut is_empty = true;
+        for face in faces {
+            bounds.take(mesh, face, origin);
+            is_empty = false;
+        }
+        if is_empty { bounds } else { bounds.rounded_outward() }
+    }
+
     /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for that.
     #[inline]
-    pub fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
+    fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
         for corner in mesh.triangle(face) {
             let corner = [corner.x - origin.x, corner.y - origin.y, corner.z - origin.z].map(|x| x as f32);
             self.lo = std::array::from_fn(|i| lesser(self.lo[i], corner[i]));

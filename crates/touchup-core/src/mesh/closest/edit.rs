@@ -78,7 +78,8 @@ impl FaceTree {
         self.parents.try_reserve(faces / 2).map_err(short)?;
         self.pairs.try_reserve(faces / 2).map_err(short)?;
         self.leaf_faces.try_reserve(faces / 2).map_err(short)?;
-        self.items.try_reserve(MOST_REBUILT as usize + 1).map_err(short)
+        self.items.try_reserve(MOST_REBUILT as usize + 1).map_err(short)?;
+        self.lefts.try_reserve(MOST_REBUILT as usize).map_err(short)
     }
 
     /// The lowest node that encloses a box and a face beside it: a node where the box makes nothing grow, found sooner

@@ -41,6 +41,15 @@ struct TreeNode {
 }
 
 impl TreeNode {
+    const NOTHING: Self = Self { bounds: Aabb::EMPTY, first: 0, count: 0 };
+
+    /// The node above two nodes.
+    #[inline]
+    fn above(nodes: &[Self; 2], pair: u32) -> Self {
+        let [left, right] = nodes;
+        Self { bounds: left.bounds.union(&right.bounds), first: pair, count: left.count + right.count }
+    }
+
     #[inline]
     fn is_leaf(&self) -> bool {
         self.count <= LEAF_FACES as u32
@@ -73,8 +82,10 @@ pub struct FaceTree {
     leaf_of_face: Vec<u32>,
     free_pair: u32,
     free_leaf: u32,
-    /// room for what is rebuilt
+    /// room for what is rebuilt …
     items: Vec<Item>,
+    /// … and its order
+    lefts: Vec<u32>,
     /// counts insertions and removals, so that a plan knows whether it still holds
     edits: u64,
     /// counts those and the refits after motions of unknown length …
@@ -100,7 +111,7 @@ impl FaceTree {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.pairs.capacity() * size_of::<SiblingNodes>()
-            + (self.parents.capacity() + self.leaf_of_face.capacity()) * size_of::<u32>()
+            + (self.parents.capacity() + self.leaf_of_face.capacity() + self.lefts.capacity()) * size_of::<u32>()
             + self.leaf_faces.capacity() * size_of::<[FaceId; LEAF_FACES]>()
             + self.items.capacity() * size_of::<Item>()
     }
@@ -123,8 +134,6 @@ impl FaceTree {
     /// The box around some faces.
     #[inline]
     fn bounds_of(&self, mesh: &TriMesh, faces: &[FaceId]) -> Aabb {
-        let mut bounds = Aabb::EMPTY;
-        faces.iter().for_each(|&face| bounds.take(mesh, face, &self.origin));
-        if faces.is_empty() { bounds } else { bounds.rounded_outward() }
+        Aabb::around(mesh, &self.origin, faces.iter().copied())
     }
 }
