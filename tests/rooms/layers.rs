@@ -33,7 +33,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
-    ("session", "clock numeric stylus mesh reconstruct haptic live features io"),
+    ("session", "clock numeric stylus mesh reconstruct haptic live features io scan"),
     (
         "report",
         "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",

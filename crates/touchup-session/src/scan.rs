@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use touchup_core::mesh::{RepairReport, TriMesh};
+use nalgebra::Point3;
+use touchup_core::mesh::{RepairReport, Texture, TriMesh};
 use touchup_core::reconstruct::{CloudError, CloudSummary, CloudSurface, surface_of_cloud};
-use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshOrPoints, MeshUnit, read_mesh_or_points, repaired};
+use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshOrPoints, MeshUnit, VertexColumn};
+use touchup_io::mesh_file::{read_appearance, read_mesh_or_points, repaired};
 
 use crate::threads::Threads;
 
@@ -55,4 +57,22 @@ pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     let MeshFile { mesh, repair } = repaired(path, unit, positions, faces)?;
     tracing::warn!("{}: {summary}", path.display());
     Ok(Scan { mesh, repair, cloud: Some(summary) })
+}
+
+/// Colours and texture of a scan on the mesh that was refined of it; nothing where the file has none.
+///
+/// - `path`, `unit`: of the scan.
+/// - `places`: for each vertex of `mesh` where it is, or was, on the scan, m in O.
+///
+/// # Errors
+/// [`MeshFileError`] when the file cannot be read any more.
+pub fn carried_over(
+    path: &Path,
+    unit: MeshUnit,
+    mesh: &TriMesh,
+    places: &[Point3<f64>],
+) -> Result<(Vec<VertexColumn>, Option<Texture>), MeshFileError> {
+    let Some(appearance) = read_appearance(path, unit)? else { return Ok(Default::default()) };
+    let colours = appearance.colours_at(places, &Threads).map(VertexColumn::of_colours);
+    Ok((colours.unwrap_or_default(), appearance.texture_on(mesh, places, &Threads)))
 }

@@ -273,7 +273,11 @@ fn colours_and_textures_come_back_from_either_kind_of_file() {
     let check = |name: &str| {
         let appearance = read_appearance(&at(name), Metre).unwrap().expect("it says how it looks");
         let mesh = read_mesh(&at(name), Metre).unwrap().mesh;
-        assert_eq!(appearance.colours_at(mesh.positions(), &Alone), Some(VertexColours::Rgb(colours.clone())), "{name}");
+        assert_eq!(
+            appearance.colours_at(mesh.positions(), &Alone),
+            Some(VertexColours::Rgb(colours.clone())),
+            "{name}"
+        );
         assert_eq!(appearance.texture_on(&mesh, mesh.positions(), &Alone), Some(texture.clone()), "{name}");
         mesh
     };
@@ -304,7 +308,9 @@ fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
     };
     let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
     let tail = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
-    let of = |kind: &str| format!("{head}property {kind} red\nproperty {kind} green\nproperty {kind} blue\nproperty {kind} alpha\n{tail}");
+    let of = |kind: &str| {
+        format!("{head}property {kind} red\nproperty {kind} green\nproperty {kind} blue\nproperty {kind} alpha\n{tail}")
+    };
     let shares = of("float") + "0 0 0 0 .5 1 1\n1 0 0 .2 .4 .6 .8\n0 1 0 1 1 1 0\n3 0 1 2\n";
     let expected = VertexColours::Rgba(vec![[0, 128, 255, 255], [51, 102, 153, 204], [255, 255, 255, 0]]);
     assert_eq!(read("shares.ply", &shares), Some(expected));

@@ -87,8 +87,7 @@ impl Appearance {
             let onward = at_point(&self.mesh, texture, hit.face, &corner);
             let there = self.hit(&corner).filter(|there| texture.shown[there.face.0 as usize] == shown);
             let found = there.map(|there| at_point(&self.mesh, texture, there.face, &there.point));
-            let is_beside =
-                |found: &Vector2<f32>| (found - onward).norm() <= ON_ONE_CHART * (onward - centre).norm();
+            let is_beside = |found: &Vector2<f32>| (found - onward).norm() <= ON_ONE_CHART * (onward - centre).norm();
             found.filter(is_beside).unwrap_or(onward).into()
         });
         (corners, shown)

@@ -19,13 +19,14 @@ use super::atomic::AtomicFile;
 pub use super::file_error::FilePlace;
 use super::file_error::{FileError, read_file, write_file};
 use appearance::SoupTexture;
-pub use appearance::read_appearance;
 pub use column::{ColumnValues, VertexColumn};
 pub use defect::Defect;
 use defect::Syntax;
 use point_cloud::CloudFormat;
 use soup::Soup;
-use touchup_core::mesh::{FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair};
+use touchup_core::mesh::{
+    Appearance, FARTHEST, MeshError, PointCloud, RepairReport, Texture, TriMesh, is_place, repair,
+};
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
 /// Why a mesh file could not be read or written.
@@ -194,6 +195,31 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
     let mut file = repaired(path, unit, positions, faces)?;
     file.repair.unused_vertices += unused;
     Ok(MeshOrPoints::Mesh(Box::new(file)))
+}
+
+/// How the mesh in a PLY or OBJ file looks; `None` where nothing is said of it, and for files of other kinds.
+///
+/// - `unit`: of the coordinates in the file.
+///
+/// # Errors
+/// [`MeshFileError::File`], [`MeshFileError::Syntax`], [`MeshFileError::Mesh`].
+pub fn read_appearance(path: &Path, unit: MeshUnit) -> Result<Option<Appearance>, MeshFileError> {
+    // a pipe cannot be read twice
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let bytes = read_file(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let soup = match Format::of_content(&bytes).map_or_else(|| Format::of_name(path), Ok) {
+        Ok(Format::Ply) => ply::painted::read_painted(&bytes, unit.metres()),
+        Ok(Format::Obj) => obj::read_painted(&bytes, unit.metres(), folder),
+        Ok(Format::Stl) | Err(_) => return Ok(None),
+    };
+    let soup = soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    if soup.faces.is_empty() || (soup.colours.is_none() && soup.texture.is_none()) {
+        return Ok(None);
+    }
+    soup.appearance(folder).map(Some).map_err(|source| MeshFileError::Mesh { path: path.into(), source })
 }
 
 /// The mesh of what `path` holds, repaired ([`repair`]).

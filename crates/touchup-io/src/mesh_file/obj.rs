@@ -46,13 +46,16 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
     let (models, materials) = load(&bytes, &mut lines, materials)?;
     let (mut soup, mut texture, mut colours) = (PaintedSoup::default(), SoupTexture::default(), Vec::new());
     let mut image_of = vec![None; materials.len()];
-    for Model { mesh, .. } in &models {
-        let of = |&corner: &u32| mesh.texcoords.as_chunks().0.get(corner as usize).map_or([0.0; 2], |uv| uv.map(|x| x as f32));
+    for model in &models {
+        let mesh = &model.mesh;
+        let of = |&corner: &u32| {
+            mesh.texcoords.as_chunks().0.get(corner as usize).map_or([0.0; 2], |uv| uv.map(|x| x as f32))
+        };
         let triangles = mesh.texcoord_indices.as_chunks::<3>().0;
         texture.corners.extend(triangles.iter().map(|[a, b, c]| [of(a), of(b), of(c)]));
+        take(model, scale, &mut soup.positions, &mut soup.faces);
         // a model without texture coordinates between others that have them
-        let count = soup.faces.len() + mesh.indices.len() / 3;
-        texture.corners.resize(count, [[0.0; 2]; 3]);
+        texture.corners.resize(soup.faces.len(), [[0.0; 2]; 3]);
         let shown = mesh.material_id.and_then(|id| {
             let name = materials.get(id)?.diffuse_texture.clone()?;
             Some(*image_of[id].get_or_insert_with(|| {
@@ -60,25 +63,19 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
                 texture.images.len() as u32 - 1
             }))
         });
-        texture.shown.resize(count, shown.unwrap_or(0));
+        texture.shown.resize(soup.faces.len(), shown.unwrap_or(0));
         colours.extend(mesh.vertex_color.as_chunks().0.iter().map(|of| of.map(|x| (x * 255.0).round() as u8)));
-    }
-    for model in &models {
-        take(model, scale, &mut soup.positions, &mut soup.faces);
     }
     let has_texture = models.iter().any(|model| !model.mesh.texcoord_indices.is_empty());
     soup.texture = has_texture.then_some(texture);
-    soup.colours = (!colours.is_empty() && colours.len() == soup.positions.len()).then_some(VertexColours::Rgb(colours));
+    soup.colours =
+        (!colours.is_empty() && colours.len() == soup.positions.len()).then_some(VertexColours::Rgb(colours));
     Ok(soup)
 }
 
 type Loaded = (Vec<Model>, Vec<Material>);
 
-fn load(
-    bytes: &[u8],
-    lines: &mut Lines,
-    materials: impl Fn(&Path) -> tobj::MTLLoadResult,
-) -> Result<Loaded, Syntax> {
+fn load(bytes: &[u8], lines: &mut Lines, materials: impl Fn(&Path) -> tobj::MTLLoadResult) -> Result<Loaded, Syntax> {
     let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let loaded = tobj::load_obj_buf(&mut *lines, &options, materials);
     let (models, materials) = loaded.map_err(|error| place_of(error, bytes, lines.number))?;
@@ -254,7 +251,10 @@ pub(super) fn write(
         writeln!(out)?;
     }
     let Some(texture) = texture else {
-        return soup.faces.iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", named(*a), named(*b), named(*c)));
+        return soup
+            .faces
+            .iter()
+            .try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", named(*a), named(*b), named(*c)));
     };
     let mut numbers = HashMap::new();
     for uv in texture.corners.as_flattened() {
@@ -281,7 +281,10 @@ pub(super) fn write(
 
 /// The materials that [`write`] names: an image each.
 pub(super) fn write_materials(images: &[String], out: &mut impl Write) -> io::Result<()> {
-    images.iter().zip(0..).try_for_each(|(image, at)| writeln!(out, "newmtl {}\nKd 1 1 1\nmap_Kd {image}", material(at)))
+    images
+        .iter()
+        .zip(0..)
+        .try_for_each(|(image, at)| writeln!(out, "newmtl {}\nKd 1 1 1\nmap_Kd {image}", material(at)))
 }
 
 fn material(shown: u32) -> String {

@@ -10,7 +10,7 @@ use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
 use crate::reported;
-use crate::threads::Threads;
+use crate::scan::carried_over;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
@@ -18,7 +18,7 @@ use touchup_core::reconstruct::{Patched, Patcher, Support};
 use touchup_core::stylus::ProbedPoint;
 use touchup_io::features_file::{FeatureFile, FeaturesFileError, write_features};
 use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
-use touchup_io::mesh_file::{read_appearance, read_mesh, write_mesh_with};
+use touchup_io::mesh_file::{read_mesh, write_mesh_with};
 use touchup_io::touches_file::{TouchesFileError, as_written, write_touches};
 
 /// Why a result was not written.
@@ -214,17 +214,13 @@ impl OutcomePlaces<'_> {
         origins: &[Option<Point3<f64>>],
         mut columns: Vec<VertexColumn>,
     ) -> Result<(), OutcomeError> {
-        let appearance = read_appearance(self.scan, self.unit).unwrap_or_else(|error| {
+        let places = origins.iter().zip(mesh.positions()).map(|(origin, here)| origin.unwrap_or(*here));
+        let carried = carried_over(self.scan, self.unit, mesh, &places.collect::<Vec<_>>());
+        let (colours, texture) = carried.unwrap_or_else(|error| {
             warn!("colours and texture coordinates of the scan are not carried over: {error}");
-            None
+            Default::default()
         });
-        let mut texture = None;
-        if let Some(appearance) = appearance {
-            let places = origins.iter().zip(mesh.positions()).map(|(origin, here)| origin.unwrap_or(*here));
-            let places: Vec<_> = places.collect();
-            columns.extend(appearance.colours_at(&places, &Threads).into_iter().flat_map(VertexColumn::of_colours));
-            texture = appearance.texture_on(mesh, &places, &Threads);
-        }
+        columns.extend(colours);
         write_mesh_with(self.mesh, mesh, &columns, texture.as_ref(), self.unit).map_err(OutcomeError::WriteMesh)
     }
 

@@ -103,8 +103,8 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
         let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
         contacts.near(&contact.point, AVERAGED_WITHIN * radius, |distance_squared, index| {
             if let Some(rest) = rest[index as usize] {
-                let weight = contacts.means()[index as usize].weight
-                    * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
+                let weight =
+                    contacts.means()[index as usize].weight * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
                 sum += weight * rest;
                 variance += weight * weight * contacts.noise_variance(index);
                 weights += weight;

@@ -2,7 +2,7 @@
 
 mod body;
 mod header;
-mod painted;
+pub(super) mod painted;
 
 use std::io::{self, Write};
 
@@ -15,11 +15,14 @@ use super::soup::Soup;
 use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
-pub(super) use painted::read_painted;
-use painted::{IMAGE, OF_CORNERS};
 
 /// Names of the list of a face's vertices; both are common.
 const VERTEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Names of the texture coordinates of the corners of a face, a list, and of the image it shows.
+const OF_CORNERS: [&str; 2] = ["texcoord", "texnumber"];
+/// An image is named by a comment that starts so.
+const IMAGE: &str = "comment TextureFile ";
 
 /// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are cut into fans.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {

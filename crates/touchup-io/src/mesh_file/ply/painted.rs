@@ -6,20 +6,15 @@ use super::super::appearance::{PaintedSoup, SoupTexture};
 use super::super::defect::Syntax;
 use super::body::Body;
 use super::header::{Element, PlyHeader, PlyKind};
-use super::{VERTEX_LISTS, fan, read, read_vertices};
+use super::{IMAGE, OF_CORNERS, VERTEX_LISTS, fan, read, read_vertices};
 use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 
 /// Names of the colours, as programs write them; the fourth says how opaque they are.
 const COLOURS: [[&str; 4]; 2] =
     [["red", "green", "blue", "alpha"], ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"]];
-/// … of the texture coordinates of vertices …
+/// … of the texture coordinates of vertices.
 const COORDINATES: [[&str; 2]; 4] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
-/// … of those of the corners of a face, a list, and of the image it shows.
-pub(super) const OF_CORNERS: [&str; 2] = ["texcoord", "texnumber"];
-/// An image is named by a comment that starts so.
-pub(super) const IMAGE: &str = "comment TextureFile ";
-
 /// The triangles as [`read`] has them, and how they look.
 pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<PaintedSoup, Syntax> {
     let header = PlyHeader::read(bytes)?;
@@ -82,9 +77,8 @@ fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'
 fn read_corners(bytes: &[u8], header: &PlyHeader, face: &Element) -> Result<(Vec<[u32; 3]>, SoupTexture), Syntax> {
     let body = || body_of(bytes, header, "face");
     let list = VERTEX_LISTS.iter().find_map(|name| face.list(name));
-    let list = list.ok_or_else(|| {
-        Syntax::unexpected(FilePlace::Line(face.line), "faces with a list vertex_indices", "none")
-    })?;
+    let list =
+        list.ok_or_else(|| Syntax::unexpected(FilePlace::Line(face.line), "faces with a list vertex_indices", "none"))?;
     // of each triangle its row, and which corners of the polygon it has
     let (mut faces, mut places, mut row_count, mut numbers) = (Vec::new(), Vec::new(), 0usize, Vec::new());
     body()?.rows(face, face.count, Some(list), |row, place| {
