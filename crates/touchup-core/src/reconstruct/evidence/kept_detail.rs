@@ -15,6 +15,7 @@ use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::agreement::{Agreement, LARGEST_MISMATCH, RESTS};
 use crate::reconstruct::evidence::contact_map::MeanContact;
 use crate::reconstruct::evidence::point_evidence::Evidence;
+use crate::reconstruct::field::lattice::VertexKey;
 
 /// A scan is finer than the tip when its edges are shorter than this, in radii.
 const FINE: f64 = 0.36;
@@ -44,7 +45,7 @@ pub(in crate::reconstruct) struct KeptDetail {
     pub scan: TriMesh,
     /// … with the tree over its faces
     pub tree: FaceTree,
-    /// vertices that are elsewhere, and what they rest on
+    /// vertices that are elsewhere, by their ids, and what they rest on
     pub moved: Vec<(VertexId, Support)>,
     pub agreement: Agreement,
 }
@@ -78,6 +79,24 @@ impl KeptDetail {
         }
         let tree = FaceTree::new(&moved_scan);
         Some(Self { scan: moved_scan, tree, moved, agreement })
+    }
+
+    /// What a vertex of the patch rests on that lies on the scan; `None` for any other.
+    pub fn support(&self, key: &VertexKey) -> Option<Support> {
+        let of = |vertex: &VertexId| {
+            let at = self.moved.binary_search_by_key(&vertex.0, |(moved, _)| moved.0);
+            at.map_or(Support::Scan, |at| self.moved[at].1)
+        };
+        let of_all = |vertices: &[VertexId]| {
+            let first = of(&vertices[0]);
+            if vertices.iter().all(|vertex| of(vertex) == first) { first } else { Support::Guessed }
+        };
+        match key {
+            VertexKey::Scan(vertex) => Some(of(vertex)),
+            VertexKey::Trace { ends, .. } => Some(of_all(ends)),
+            VertexKey::Pierce(_, face) => Some(of_all(&self.scan.corners(*face))),
+            VertexKey::Cell(..) | VertexKey::Square(..) | VertexKey::Edge(_) => None,
+        }
     }
 }
 

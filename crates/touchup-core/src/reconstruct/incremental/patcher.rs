@@ -351,14 +351,16 @@ impl Patcher {
         self.update(scan, tree);
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
         let (remesh, Renewed { patch, .. }) = self.remeshed_with(scan, tree, kept.as_ref());
+        let of_moved = |key: &VertexKey| kept.as_ref().and_then(|kept| kept.support(key));
+        let known = patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key)));
+        let known: Vec<Support> = known.collect();
         let (base, moved) = kept.map_or_else(|| (scan.clone(), Vec::new()), |kept| (kept.scan, kept.moved));
         let (mesh, ids) = patch.applied_to(base)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
         moved.iter().for_each(|&(vertex, known)| support[vertex.0 as usize] = known);
-        for ((key, _), id) in patch.vertices.iter().zip(ids) {
-            // the scan's own are known
-            if let (Some(id), false) = (id, matches!(key, VertexKey::Scan(_))) {
-                support[id.0 as usize] = remesh.support(&key);
+        for (known, id) in known.into_iter().zip(ids) {
+            if let Some(id) = id {
+                support[id.0 as usize] = known;
             }
         }
         if let Some(radius) = self.params.ball() {
@@ -440,6 +442,10 @@ impl Patcher {
         let (remesh, renewed) = all.remeshed_with(scan, tree, kept.as_ref());
         let base = kept.as_ref().map_or(scan, |kept| &kept.scan);
         let mut delta = PublishedPatch::default().take_all(renewed, &remesh, base);
+        for vertex in &mut delta.vertices {
+            let of_moved = kept.as_ref().and_then(|kept| kept.support(&vertex.key));
+            vertex.support = of_moved.unwrap_or(vertex.support);
+        }
         let moved = kept.iter().flat_map(|kept| &kept.moved);
         delta.vertices.extend(moved.map(|&(vertex, support)| {
             let key = VertexKey::Scan(vertex);
