@@ -119,7 +119,9 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
 }
 
 /// For each vertex of a refined mesh its place in the scan, m in O; `None` where it is new.
-fn origins(scan: &TriMesh, refined: &TriMesh) -> Vec<Option<Point3<f64>>> {
+type Origins = Vec<Option<Point3<f64>>>;
+
+fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
     (0..refined.vertex_slots()).map(|vertex| scan.positions().get(vertex).copied()).collect()
 }
 
@@ -131,7 +133,7 @@ fn sewn(
     origins: &[Option<Point3<f64>>],
     outside: &Outside,
     of_scan: f64,
-) -> Result<(Patched, Vec<Option<Point3<f64>>>), MeshError> {
+) -> Result<(Patched, Origins), MeshError> {
     let sewn = outside.sew_to(&part.mesh)?;
     let support = sewn.column(&part.support, Support::Scan);
     let sigma = if part.sigma.is_empty() { Vec::new() } else { sewn.column(&part.sigma, of_scan) };
