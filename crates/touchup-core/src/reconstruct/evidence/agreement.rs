@@ -10,6 +10,8 @@ pub(in crate::reconstruct) const LARGEST_MISMATCH: f64 = 1.0 / 3.0;
 const WIDTH: f64 = 1.0;
 /// Contacts without agreement take the scan from the field within this, in radii.
 const VETO: f64 = 1.0;
+/// … where they have more than this share of the weight.
+const REFUSING: f64 = 0.1;
 /// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
 const LARGEST_OFF: f64 = 0.1;
 /// … and where two touched surfaces meet, or one ends, and the scan is deeper, this.
@@ -61,20 +63,22 @@ impl Agreement {
         (sum * (share * share * (3.0 - 2.0 * share) / weights), share)
     }
 
-    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and all that are nearest do; and
-    /// whether these are on one surface that goes on all around.
+    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and nearly all that are nearest
+    /// do; and whether these are on one surface that goes on all around.
     ///
     /// - `normal`: of what was touched there.
     /// - returns: `None` where it is not.
     pub fn around(&self, contacts: &ContactMap, foot: &Point3<f64>, normal: &Vector3<f64>) -> Option<Surroundings> {
-        let (mut is_known, mut is_refused, mut is_bent) = (false, false, false);
+        let (mut is_known, mut is_bent) = (false, false);
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+        let (mut refusing, mut weights) = (0.0, 0.0);
         contacts.near(foot, RESTS * self.radius, |distance_squared, index| {
             let agrees = self.mismatch[index as usize].is_some();
             is_known |= agrees;
             if distance_squared < (VETO * self.radius).powi(2) {
                 let contact = &contacts.means()[index as usize];
-                is_refused |= !agrees;
+                refusing += if agrees { 0.0 } else { contact.weight };
+                weights += contact.weight;
                 is_bent |= contact.normal.dot(normal) < BENT;
                 sum += contact.point - foot;
                 count += 1.0;
@@ -82,7 +86,7 @@ impl Agreement {
         });
         let is_ringed = count > 0.0 && sum.norm() < RINGED * self.radius * count;
         let surroundings = if is_ringed && !is_bent { Surroundings::Smooth } else { Surroundings::BentOrOpen };
-        (is_known && !is_refused).then_some(surroundings)
+        (is_known && refusing <= REFUSING * weights).then_some(surroundings)
     }
 
     /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one, of which that is the `part`.
