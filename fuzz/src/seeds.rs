@@ -180,7 +180,7 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
     let messages: Vec<_> = (0u8..).zip(payloads()).map(message).collect();
     let template = Scene::template();
     let mut scenes: Vec<_> = template.split("\n\n").map(|section| without_comments(section).into_bytes()).collect();
-    scenes.push(b"contact: {}\ntip: {radius_mm: 1.5}\nrefine: {mode: paper}\npatch: {pitch_mm: 1}\nmarkers: {positions_mm: [[0, 0, 0]]}".into());
+    scenes.push(b"contact: {}\ntip: {radius_mm: 1.5}\nrefine: {mode: paper}\npatch: {tolerance_mm: 0.04}\nmarkers: {positions_mm: [[0, 0, 0]]}".into());
     let touches = [touchup_io::touches_file::HEADER, "\n", TOUCHES].concat();
     let all: [(&str, Vec<Vec<u8>>); 15] = [
         (

@@ -192,7 +192,7 @@ fn refine_json_is_one_object_with_the_documented_keys() {
     let mut tails = ["median", "p99", "p999", "max"];
     tails.sort_unstable();
     assert_eq!(keys(&summary["push_ns"]), tails);
-    let mut patch = ["pitch_mm", "removed_faces", "added_faces", "moved_vertices", "guessed_share", "build_s"];
+    let mut patch = ["tolerance_mm", "removed_faces", "added_faces", "moved_vertices", "guessed_share", "build_s"];
     patch.sort_unstable();
     assert_eq!(keys(&summary["patch"]), patch);
     assert_eq!(keys(&summary["uncertainty"]), ["judged", "outliers", "rejected", "relocated", "touched_sigma_mm"]);

@@ -228,9 +228,10 @@ fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
         }
     }
     let yaml = "tip: { radius_mm: 2 }\ncontact: { on_n: 1, off_n: 0.5 }\nscan: { noise_mm: 2 }\n\
-                patch: { pitch_mm: 0.4, most_faces: 3 }";
+                patch: { tolerance_mm: 0.02 }";
     let params = Scene::from_yaml(yaml).unwrap().patcher_params().unwrap();
-    assert_eq!((params.pitch, params.most_faces), (0.4e-3, 3.0));
+    // the pitch: √(16 · 2 mm · 0.02 mm)
+    assert!((params.tolerance - 0.02e-3).abs() < 1e-18 && (params.pitch() - 0.8e-3).abs() < 1e-15);
     assert_eq!(params.touches.stiffness, Some(2e4));
     assert_eq!((params.evidence.radius, params.evidence.scan_reach), (2e-3, 6e-3));
     let default = Scene::default().patcher_params();

@@ -110,7 +110,6 @@ units! {
     TOUCHES "touches";
     EDGES "mean edges";
     SIGMAS "standard deviations";
-    SCANS "times the faces of the scan";
     QUATERNION "(length of the quaternion)";
     MM "mm" per 1e3;
     MM_PER_S "mm/s" per 1e3;

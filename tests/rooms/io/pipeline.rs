@@ -313,17 +313,18 @@ fn a_wrong_unit_and_settings_that_cost_too_much_are_refused_with_the_reason() {
     write_recording(&plate.at("mm.mcap"), &Topics::default(), "object", "stylus", in_mm).unwrap();
     let tip = ["--tip-radius-mm", "1.5"];
     let poses = refine(&plate.at("scan.ply"), &plate.at("mm.mcap"), &plate.at("out.ply"), &tip);
-    let with_pitch = |pitch_mm: f64| {
+    // a lattice of √(16 · 1.5 mm · tolerance)
+    let within = |tolerance_mm: f64| {
         let scene = plate.at("fine.yaml");
-        fs::write(&scene, format!("tip: {{ radius_mm: 1.5 }}\npatch: {{ pitch_mm: {pitch_mm} }}\n")).unwrap();
+        fs::write(&scene, format!("tip: {{ radius_mm: 1.5 }}\npatch: {{ tolerance_mm: {tolerance_mm} }}\n")).unwrap();
         plate.refine("out.ply", &["--scene", scene.to_str().unwrap()])
     };
     let refused = [
         (poses, "the poses look like mm"),
         (plate.refine("out.ply", &["--tip-radius-mm", "0.0015"]), "tip.radius_mm is 0.0015"),
         (plate.refine("out.ply", &["--tip-radius-mm", "1e-6"]), "tip.radius_mm is 1e-6"),
-        (with_pitch(0.02), "around one contact of a tip of 1.5 mm would have 3.9e7 nodes and take 15.5 GB"),
-        (with_pitch(0.08), "around all that was touched would have"),
+        (within(0.02 * 0.02 / 24.0), "around one contact of a tip of 1.5 mm would have 3.9e7 nodes and take 15.5 GB"),
+        (within(0.08 * 0.08 / 24.0), "around all that was touched would have"),
     ];
     for (output, why) in refused {
         assert!(code(&output) == 3 && stderr(&output).contains(why), "{why}: {}", stderr(&output));

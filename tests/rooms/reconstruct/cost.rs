@@ -8,17 +8,22 @@ use touchup::stylus::{ContactEstimator, ContactEstimatorParams, Sample, TipParam
 
 const RADIUS: f64 = 1.5e-3;
 
+/// Settings by which the lattice has this pitch (m): p = √(16 · radius · tolerance).
+fn with_pitch(radius: f64, pitch: f64) -> PatcherParams {
+    PatcherParams { tolerance: pitch * pitch / (16.0 * radius), ..PatcherParams::new(radius, None, 0.05e-3) }
+}
+
 fn refused(radius: f64, pitch: f64) -> Option<String> {
-    let params = PatcherParams { pitch, ..PatcherParams::new(radius, None, 0.05e-3) };
+    let params = with_pitch(radius, pitch);
     Patcher::new(params).err().map(|error| error.to_string())
 }
 
 /// A ball of 2.8 radii of 1.5 mm holds 310 mm³: 39 million nodes 0.02 mm apart, 4 million 0.043 mm apart.
 #[test]
 fn a_lattice_that_one_contact_would_fill_the_memory_with_is_refused_with_the_figure() {
-    for (pitch, nodes) in [(0.02e-3, "3.9e7 nodes"), (0.001e-3, "3.1e11 nodes")] {
+    for (pitch, nodes) in [(0.02e-3, "3.9e7 nodes"), (0.005e-3, "2.5e9 nodes")] {
         let why = refused(RADIUS, pitch).expect("it is refused");
-        for part in ["patch.pitch_mm", nodes, "4.27e-2 or more", "GB"] {
+        for part in ["patch.tolerance_mm", nodes, "7.59e-5 or more", "GB"] {
             assert!(why.contains(part), "{part} is not in: {why}");
         }
     }
@@ -36,8 +41,7 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
     let volume = SIDE * SIDE * 2.0 * reach + 2.0 * SIDE * PI * reach.powi(2) + 4.0 / 3.0 * PI * reach.powi(3);
     assert!((volume * 1e9 - 11_196.0).abs() < 1.0, "{}", volume * 1e9);
     let checked = |pitch: f64| {
-        let params = PatcherParams { pitch, ..PatcherParams::new(RADIUS, None, 0.05e-3) };
-        let mut patcher = Patcher::new(params).unwrap();
+        let mut patcher = Patcher::new(with_pitch(RADIUS, pitch)).unwrap();
         let tip = TipParams { radius: RADIUS, stiffness: None };
         let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
         for i in 0..600 * 31 {
@@ -54,7 +58,7 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
     let figure = why.split("would have ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
     let ratio = figure.parse::<f64>().unwrap() * 1e-12 / volume;
     assert!((0.75..1.33).contains(&ratio), "{ratio}: {why}");
-    for part in ["patch.pitch_mm is 0.1", "all that was touched", "GB"] {
+    for part in ["patch.tolerance_mm is 0.0004", "all that was touched", "GB"] {
         assert!(why.contains(part), "{part} is not in: {why}");
     }
     assert_eq!(checked(0.15e-3), Ok(()));

@@ -57,8 +57,7 @@ guard.smallest_turn_cosine - 0.5 -1 1
 guard.smallest_evidence_cosine - 0 -1 1
 guard.smallest_fold_cosine - -0.85 -1 1
 guard.gap_edges edges 0.01 0 1
-patch.pitch_mm mm - 0.001 1000
-patch.most_faces scan 10 1 1e6
+patch.tolerance_mm mm - 1e-6 100
 uncertainty.radius_sigma_mm mm 0.001 0 1000
 uncertainty.place_sigma_mm mm 0.002 0 1000
 uncertainty.stiffness_percent % 2 0 100

@@ -38,5 +38,5 @@ pub use field::piecewise::{FieldParams, FieldScratch, FieldValue};
 pub use field::uncertainty::FitSigma;
 pub use incremental::delta::{PatchDelta, PatchVertex};
 pub use incremental::history::History;
-pub use incremental::patcher::{PatchParams, PatchRegion, Patcher, PatcherParams};
+pub use incremental::patcher::{PatchParams, Patcher, PatcherParams};
 pub use table::{CellTable, Key};

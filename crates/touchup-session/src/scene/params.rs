@@ -142,7 +142,7 @@ impl Scene {
 
     /// Settings of the patcher; `None` without `patch` or `contact`, and in the mode of the paper.
     pub fn patcher_params(&self) -> Option<PatcherParams> {
-        let PatchParams { pitch, most_faces } = self.patch.filter(|_| self.has_patch() && self.contact.is_some())?;
+        let PatchParams { tolerance } = self.patch.filter(|_| self.has_patch() && self.contact.is_some())?;
         let (shape, TipParams { radius, stiffness }, noise) = (self.tip_shape(), self.tip_params(), self.scan_noise());
         // a tip that cannot be is refused by the patcher
         let mut params = PatcherParams::for_tip(shape, radius, stiffness, noise)
@@ -153,8 +153,7 @@ impl Scene {
         if let Some(sync) = &self.sync {
             params.touches.largest_gap_ns = sync.largest_gap_ns;
         }
-        params.pitch = pitch.unwrap_or(params.pitch);
-        params.most_faces = most_faces;
+        params.tolerance = tolerance.unwrap_or(params.tolerance);
         params.uncertainty = self.uncertainty.map(|known| UncertaintyParams { scan: noise, ..known });
         Some(params)
     }

@@ -3,7 +3,7 @@
 use super::{Scene, SceneError};
 use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion};
 use touchup_core::mesh::{Outside, Region, TriMesh};
-use touchup_core::reconstruct::{PatchRegion, PatcherParams};
+use touchup_core::reconstruct::PatcherParams;
 use touchup_core::stylus::WrenchFrame;
 
 /// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two, free space another one …
@@ -28,7 +28,7 @@ pub struct RegionCut {
     /// the rest of the scan; `None` where the scene names no region
     pub outside: Option<Outside>,
     haptic: Option<ScanRegion>,
-    patch: Option<PatchRegion>,
+    patch: Option<Region>,
 }
 
 impl Scene {
@@ -46,17 +46,14 @@ impl Scene {
         let Some(region) = self.region() else {
             return Ok(CutScan { mesh: scan, cut: RegionCut::default() });
         };
-        let (mean_edge, faces) = (scan.mean_edge(), scan.face_count());
+        let mean_edge = scan.mean_edge();
         let margin = self.margin(mean_edge);
         let (mesh, outside) = scan.cut(&region.grown(margin));
         if mesh.face_count() == 0 {
             return Err(SceneError::EmptyRegion);
         }
         let haptic = Some(ScanRegion { region, margin, mean_edge });
-        Ok(CutScan {
-            mesh,
-            cut: RegionCut { outside: Some(outside), haptic, patch: Some(PatchRegion { region, faces }) },
-        })
+        Ok(CutScan { mesh, cut: RegionCut { outside: Some(outside), haptic, patch: Some(region) } })
     }
 
     /// How far around the region a touch in it can change anything, m.
@@ -72,7 +69,7 @@ impl Scene {
             roi + params.tip.radius + furthest.max(params.largest_move_noises * params.scan_noise)
         });
         let of_patch = patch
-            .map_or(0.0, |params| TIPS * params.evidence.radius + params.evidence.scan_reach + CELLS * params.pitch);
+            .map_or(0.0, |params| TIPS * params.evidence.radius + params.evidence.scan_reach + CELLS * params.pitch());
         of_update.max(of_patch) + EDGES * mean_edge
     }
 }

@@ -81,8 +81,8 @@ pub struct Outcome {
 reported! {
     /// The patch in the report.
     pub struct PatchSummary, fn of(patched: &Patched, seconds: f64) {
-        /// edge length of the new faces
-        pitch_mm: f64 = patched.pitch * 1e3,
+        /// how far the new faces may be from the surface that the touches show
+        tolerance_mm: f64 = patched.tolerance * 1e3,
         /// faces of the scan that went
         removed_faces: usize = patched.removed_faces,
         /// faces that came
@@ -177,16 +177,10 @@ impl OutcomePlaces<'_> {
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
     pub fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
-        let (started, wanted) = (Instant::now(), patcher.params().pitch);
+        let started = Instant::now();
         patcher.flush();
         let patched = patcher.patched(scan, &FaceTree::new(scan))?;
         self.check_changed(patched.removed_faces + patched.moved_vertices)?;
-        if patched.pitch > wanted {
-            let (pitch_mm, wanted_mm) = (patched.pitch * 1e3, wanted * 1e3);
-            warn!(
-                "new faces of {pitch_mm:.2} mm instead of {wanted_mm:.2}: finer ones would be more than patch.most_faces"
-            );
-        }
         let build_s = started.elapsed().as_secs_f64();
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
         let moved_faces = moved_faces(scan, &patched.mesh);
@@ -242,12 +236,12 @@ impl OutcomePlaces<'_> {
 
 impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pitch_mm, guessed_share, .. } = self;
+        let Self { tolerance_mm, guessed_share, .. } = self;
         let [removed, added] = [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
         let guessed = guessed_share * 100.0;
         write!(
             f,
-            "{removed} of the scan replaced by {added} of {pitch_mm:.2} mm ({guessed:.0} % of their vertices guessed)"
+            "{removed} of the scan replaced by {added}, within {tolerance_mm:.3} mm ({guessed:.0} % of their vertices guessed)"
         )?;
         match self.moved_vertices {
             0 => Ok(()),

@@ -1,6 +1,7 @@
 //! The zero set of the field as a mesh: dual contouring, and the scan clipped to its rim.
 
 pub(in crate::reconstruct) mod clip;
+pub(in crate::reconstruct) mod coarsening;
 pub(in crate::reconstruct) mod crossing;
 pub(in crate::reconstruct) mod dual;
 pub(in crate::reconstruct) mod dual_contouring;

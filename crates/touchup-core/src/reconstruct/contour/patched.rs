@@ -82,8 +82,8 @@ pub struct Patched {
     pub support: Vec<Support>,
     /// standard deviation of each vertex along the normal, m, by id; none without [`crate::reconstruct::PatcherParams::uncertainty`]
     pub sigma: Vec<f64>,
-    /// edge length of the lattice, m
-    pub pitch: f64,
+    /// how far the new faces may be from the surface that the touches show, m
+    pub tolerance: f64,
     /// faces of the scan that were removed
     pub removed_faces: usize,
     /// faces that were added
@@ -136,7 +136,7 @@ mod tests {
             mesh,
             support,
             sigma,
-            pitch: 1.0,
+            tolerance: 1.0,
             removed_faces: 0,
             added_faces: 0,
             moved_vertices: 0,

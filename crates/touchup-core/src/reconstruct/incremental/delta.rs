@@ -4,6 +4,7 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceId, TriMesh};
 use crate::reconstruct::LatticeRegion;
+use crate::reconstruct::contour::coarsening::CoarseBlocks;
 use crate::reconstruct::contour::patched::{Patch, Support};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey};
 use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
@@ -60,9 +61,8 @@ pub(in crate::reconstruct) struct PublishedPatch {
     /// the owners of the lattice among them, by blocks of cells
     blocks: CellTable<LatticeNode, Vec<Owner>>,
     vertices: CellTable<VertexKey, Placed>,
-    face_count: usize,
-    /// faces of the scan that were removed
-    gone: usize,
+    /// where faces were merged
+    coarse: CoarseBlocks,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,9 +84,9 @@ struct Draft {
 }
 
 impl PublishedPatch {
-    /// How many faces more the mesh has by the patch.
-    pub fn faces_more(&self) -> f64 {
-        self.face_count as f64 - self.gone as f64
+    /// Where faces were merged.
+    pub fn coarse(&self) -> &CoarseBlocks {
+        &self.coarse
     }
 
     /// The faces of the scan that were touched.
@@ -98,20 +98,34 @@ impl PublishedPatch {
     }
 
     /// As [`Self::take`], where everything was renewed.
-    pub fn take_all(&mut self, mut renewed: Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
+    ///
+    /// - `coarse`: where faces of it were merged.
+    pub fn take_all(
+        &mut self,
+        mut renewed: Renewed,
+        coarse: CoarseBlocks,
+        remesh: &Remesh,
+        scan: &TriMesh,
+    ) -> PatchDelta {
         renewed.core = CellBox::ALL;
         renewed.scanned.extend(self.scan_faces());
-        self.take(&renewed, remesh, scan)
+        let delta = self.take(&renewed, remesh, scan);
+        self.coarse = coarse;
+        delta
     }
 
     /// Takes up what was renewed; returns what is another than before.
     ///
     /// - `remesh`: by which it was renewed.
     pub fn take(&mut self, renewed: &Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
-        let next = faces_by_owner(&renewed.patch);
         let mut draft = Draft::default();
-        for owner in self.owners_around(&renewed.core, &remesh.region).into_iter().filter(|owner| !next.contains(owner))
-        {
+        let core = self.coarse.around(&renewed.core);
+        self.coarse.refine(&renewed.core);
+        // beside the blocks that are whole in it
+        let next = faces_by_owner(&renewed.patch, |owner| !self.coarse.holds(owner));
+        let mut around = self.owners_around(&core, &remesh.region);
+        around.retain(|owner| !next.contains(owner) && !self.coarse.holds(owner));
+        for owner in around {
             self.replace(owner, Vec::new(), &mut draft);
             self.forget(owner);
         }
@@ -169,20 +183,15 @@ impl PublishedPatch {
         if !is_new && *self.faces.value_mut(at) == faces {
             return;
         }
-        if is_new {
-            match owner.node() {
-                None => self.gone += 1,
-                Some(node) => self.blocks.get_or_default(block_of(node)).push(owner),
-            }
+        if let Some(node) = owner.node().filter(|_| is_new) {
+            self.blocks.get_or_default(block_of(node)).push(owner);
         }
         draft.delta.owners.push((owner, faces.len() as u32));
         for key in faces.iter().flatten() {
             self.vertices.get_or_default(*key).uses += 1;
         }
         draft.delta.faces.extend(faces.iter().map(|face| face.map(|key| draft.at.insert_with(key, || ()).0)));
-        self.face_count += faces.len();
         let before = std::mem::replace(self.faces.value_mut(at), faces);
-        self.face_count -= before.len();
         for key in before.into_iter().flatten() {
             if let Some(placed) = self.vertices.get_mut(&key) {
                 placed.uses -= 1;
@@ -217,13 +226,13 @@ impl PublishedPatch {
     }
 }
 
-/// The faces of a patch by their owners; faces of the scan that go without a remainder have none.
-fn faces_by_owner(patch: &Patch) -> CellTable<Owner, Vec<NamedFace>> {
+/// The faces of a patch by those of their owners that are `wanted`; faces of the scan that go without a remainder have none.
+fn faces_by_owner(patch: &Patch, wanted: impl Fn(&Owner) -> bool) -> CellTable<Owner, Vec<NamedFace>> {
     let mut by_owner: CellTable<Owner, Vec<NamedFace>> = CellTable::default();
     for face in &patch.removed {
         by_owner.insert_with(Owner::Scan(*face), Vec::new);
     }
-    for face in &patch.faces {
+    for face in patch.faces.iter().filter(|face| wanted(&face.owner)) {
         by_owner.get_or_default(face.owner).push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
     }
     by_owner

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, MeshError, Region, TriMesh};
 use crate::parameters;
+use crate::reconstruct::contour::coarsening::{CoarseBlocks, coarsen};
 use crate::reconstruct::contour::patched::{Patch, Patched, Support};
 use crate::reconstruct::evidence::agreement::Agreement;
 use crate::reconstruct::evidence::contact_map::{ContactMap, GateParams};
@@ -34,36 +35,23 @@ pub struct PatcherParams {
     pub evidence: EvidenceParams,
     /// whether free space is evidence: where the tip went, there is no material. Else the scan stays where nothing was touched
     pub free_space: bool,
-    /// edge length of the lattice, m
-    pub pitch: f64,
-    /// a patch may have this many times the faces of the scan: where it would have more, the lattice is made coarser
-    pub most_faces: f64,
+    /// how far the new faces may be from the surface that the touches show, m
+    pub tolerance: f64,
     /// the model of uncertainty; `None`: no uncertainty, and nothing is rejected
     pub uncertainty: Option<UncertaintyParams>,
-    /// `None`: the mesh is the whole scan, and may be touched anywhere
-    pub region: Option<PatchRegion>,
-}
-
-/// The part of a scan that a patcher has, and where in it may be touched.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PatchRegion {
-    /// what the tip does elsewhere is not looked at
-    pub region: Region,
-    /// faces of the whole scan
-    pub faces: usize,
+    /// what the tip does elsewhere is not looked at; `None`: the scan may be touched anywhere
+    pub region: Option<Region>,
 }
 
 parameters! {
     /// How fine the reconstructed surface is.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PatchParams in "patch" {
-        /// Edge length of the new faces; left out: half the radius of the tip.
+        /// How far the new faces may be from the surface that the touches show, on planes and down to holes twice as wide as the tip: a
+        /// smaller one makes finer faces at edges and in holes, and takes longer. Left out: 1/64 of the radius of the tip.
         ///
         /// In m.
-        pitch: Option<f64> = None, "pitch_mm" [MM, 0.001, 1000] like "0.75";
-        /// The result has at most this many times the faces of the scan (and 5000): where it would have more, the new faces become
-        /// larger.
-        most_faces: f64 = 10.0, "most_faces" [SCANS, 1, 1e6];
+        tolerance: Option<f64> = None, "tolerance_mm" [MM, 1e-6, 100] like "0.02";
     }
 }
 
@@ -75,11 +63,16 @@ impl PatcherParams {
             touches: TouchFinderParams::new(radius, stiffness),
             evidence: EvidenceParams::new(radius, noise),
             free_space: true,
-            pitch: radius / 2.0,
-            most_faces: PatchParams::default().most_faces,
+            tolerance: TOLERANCE * radius,
             uncertainty: Some(UncertaintyParams::new(noise)),
             region: None,
         }
+    }
+
+    /// Edge length of the lattice, m: on a cylinder of twice the tip's radius r, faces between points p apart are off by the sagitta
+    /// p² / (8 · 2 r), which is the tolerance.
+    pub fn pitch(&self) -> f64 {
+        (16.0 * self.evidence.radius * self.tolerance).sqrt()
     }
 
     /// The longest smoothing window: contacts within it share their noise, ns.
@@ -116,7 +109,7 @@ impl PatcherParams {
     /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built before.
     fn check_cost(&self) -> Result<(), SettingError> {
         let around = format!("one contact of a tip of {} mm", self.evidence.radius * 1e3);
-        self.check_nodes(nodes_around_contact(self.evidence.radius, self.pitch), MOST_NODES, &around)
+        self.check_nodes(nodes_around_contact(self.evidence.radius, self.pitch()), MOST_NODES, &around)
     }
 
     /// Refuses a lattice of more than `most` nodes.
@@ -125,11 +118,11 @@ impl PatcherParams {
     fn check_nodes(&self, nodes: f64, most: f64, around: &str) -> Result<(), SettingError> {
         let why = format!(
             "{:.2e} or more: the lattice around {around} would have {nodes:.1e} nodes and take {:.1} GB; a larger \
-             patch.pitch_mm takes less",
-            self.pitch * (nodes / most).cbrt() * 1e3,
+             patch.tolerance_mm takes less",
+            self.tolerance * (nodes / most).cbrt().powi(2) * 1e3,
             nodes * NODE_BYTES * 1e-9,
         );
-        SettingError::check("patch.pitch_mm", self.pitch * 1e3, nodes <= most, &why)
+        SettingError::check("patch.tolerance_mm", self.tolerance * 1e3, nodes <= most, &why)
     }
 
     /// # Errors
@@ -138,7 +131,7 @@ impl PatcherParams {
         let radius = self.evidence.radius;
         let is_tip = radius >= SMALLEST_TIP;
         SettingError::check("tip.radius_mm", radius * 1e3, is_tip, "0.01 or more where there is a patch")?;
-        PatchParams { pitch: Some(self.pitch), most_faces: self.most_faces }.check()?;
+        PatchParams { tolerance: Some(self.tolerance) }.check()?;
         self.check_cost()?;
         let noise = self.uncertainty.map_or(0.0, |known| known.scan);
         SettingError::check("scan.noise_mm", noise * 1e3, noise >= 0.0, "0 to 1000 mm")?;
@@ -215,6 +208,8 @@ impl LivePatch {
     }
 }
 
+/// The tolerance, in radii: a lattice of half the radius.
+const TOLERANCE: f64 = 1.0 / 64.0;
 /// Smallest radius of a tip that touches for a patch, m: a fifth of the finest stylus that is sold.
 const SMALLEST_TIP: f64 = 1e-5;
 /// Nodes around one contact at most: a ball of 1.5 mm on a lattice of 0.042 mm.
@@ -227,10 +222,6 @@ const NODE_BYTES: f64 = 400.0;
 const CONTACT_CELL: f64 = 1.0 / 3.0;
 /// Edge of the cells of one centre, in radii.
 const SWEPT_CELL: f64 = 0.1;
-/// A budget below this many faces is none: a box has twelve.
-const LEAST_BUDGET: f64 = 5000.0;
-/// Rounds in which the lattice is made coarser to keep the budget.
-const COARSER: usize = 3;
 /// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on them.
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
 
@@ -289,10 +280,10 @@ impl Patcher {
     /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any of it is made.
     ///
     /// # Errors
-    /// [`SettingError`] of `patch.pitch_mm`, with nodes and memory.
+    /// [`SettingError`] of `patch.tolerance_mm`, with nodes and memory.
     pub fn check_extent(&self) -> Result<(), SettingError> {
         let means = self.history.contacts.means().iter().map(|mean| mean.point);
-        let nodes = nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch);
+        let nodes = nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch());
         self.params.check_nodes(nodes, MOST_NODES_IN_ALL, "all that was touched")
     }
 
@@ -350,10 +341,9 @@ impl Patcher {
         self.history.contacts.note_all();
         self.update(scan, tree);
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
-        let (remesh, Renewed { patch, .. }) = self.remeshed_with(scan, tree, kept.as_ref());
-        let of_moved = |key: &VertexKey| kept.as_ref().and_then(|kept| kept.support(key));
-        let known = patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key)));
-        let known: Vec<Support> = known.collect();
+        let (remesh, Renewed { mut patch, .. }) = self.remeshed(scan, tree, kept.as_ref());
+        let known = support(&patch, &remesh, kept.as_ref());
+        coarsen(&mut patch, &known, self.params.tolerance);
         let (base, moved) = kept.map_or_else(|| (scan.clone(), Vec::new()), |kept| (kept.scan, kept.moved));
         let (mesh, ids) = patch.applied_to(base)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
@@ -371,7 +361,7 @@ impl Patcher {
             mesh,
             support,
             sigma,
-            pitch: remesh.grid.lattice.pitch,
+            tolerance: self.params.tolerance,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
             moved_vertices: moved.len(),
@@ -388,8 +378,8 @@ impl Patcher {
         mesh.positions().iter().zip(support).map(&mut of).collect()
     }
 
-    /// What changed in the patch since the last call. The time depends on how much there is to remesh near the changes;
-    /// where the budget was passed, everything is remeshed, by a coarser lattice.
+    /// What changed in the patch since the last call. The time depends on how much there is to remesh near the changes. Its faces are
+    /// those of the lattice: they are merged to fewer where the patch has settled, and come again where it changes then.
     ///
     /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge of the lattice, and where
     /// nothing was touched by more.
@@ -398,18 +388,18 @@ impl Patcher {
     pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         self.update(scan, tree);
         let mut live = self.live.take().unwrap_or_else(|| LivePatch {
-            remesh: Remesh::new(lattice_of(self.params.pitch)),
+            remesh: Remesh::new(lattice_of(self.params.pitch())),
             changes: self.all_changes(),
             ..LivePatch::default()
         });
         let (changes, late) = live.take_changes();
-        let faces = self.whole(scan) + live.published.faces_more();
-        let delta = if live.is_outdated || faces > self.budget(scan) {
-            let (remesh, renewed) = self.remeshed(scan, tree);
+        let delta = if live.is_outdated {
+            let (remesh, renewed) = self.remeshed(scan, tree, None);
             (live.remesh, live.is_outdated) = (remesh, false);
-            live.published.take_all(renewed, &live.remesh, scan)
+            live.published.take_all(renewed, CoarseBlocks::default(), &live.remesh, scan)
         } else {
-            let renewed = live.remesh.renew(&self.evidence(scan, tree, None), &changes, &late);
+            let evidence = self.evidence(scan, tree, None);
+            let renewed = live.remesh.renew(&evidence, &changes, &late, live.published.coarse());
             live.published.take(&renewed, &live.remesh, scan)
         };
         self.live = Some(live);
@@ -422,10 +412,12 @@ impl Patcher {
     /// It takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         let all = self.flushed(scan, tree);
-        let ((remesh, renewed), until_ns) = (all.remeshed(scan, tree), all.history.until_ns);
+        let ((remesh, mut renewed), until_ns) = (all.remeshed(scan, tree, None), all.history.until_ns);
+        let known = support(&renewed.patch, &remesh, None);
+        let coarse = coarsen(&mut renewed.patch, &known, self.params.tolerance);
         let mut live = self.live.take().unwrap_or_default();
         (live.remesh, live.is_outdated) = (remesh, false);
-        let delta = live.published.take_all(renewed, &live.remesh, scan);
+        let delta = live.published.take_all(renewed, coarse, &live.remesh, scan);
         self.live = Some(live);
         PatchDelta { until_ns, ..delta }
     }
@@ -439,9 +431,11 @@ impl Patcher {
     pub fn patch_of_all(&self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         let all = self.flushed(scan, tree);
         let kept = KeptDetail::of(&all.evidence(scan, tree, None));
-        let (remesh, renewed) = all.remeshed_with(scan, tree, kept.as_ref());
+        let (remesh, mut renewed) = all.remeshed(scan, tree, kept.as_ref());
+        let known = support(&renewed.patch, &remesh, kept.as_ref());
+        let coarse = coarsen(&mut renewed.patch, &known, self.params.tolerance);
         let base = kept.as_ref().map_or(scan, |kept| &kept.scan);
-        let mut delta = PublishedPatch::default().take_all(renewed, &remesh, base);
+        let mut delta = PublishedPatch::default().take_all(renewed, coarse, &remesh, base);
         for vertex in &mut delta.vertices {
             let of_moved = kept.as_ref().and_then(|kept| kept.support(&vertex.key));
             vertex.support = of_moved.unwrap_or(vertex.support);
@@ -492,49 +486,29 @@ impl Patcher {
         }
     }
 
-    fn budget(&self, scan: &TriMesh) -> f64 {
-        (self.params.most_faces * self.whole(scan)).max(LEAST_BUDGET)
-    }
-
-    /// Faces of the whole scan.
-    fn whole(&self, scan: &TriMesh) -> f64 {
-        self.params.region.map_or(scan.face_count(), |touched| touched.faces) as f64
-    }
-
-    /// The patch of everything, within the budget.
-    fn remeshed(&self, scan: &TriMesh, tree: &FaceTree) -> (Remesh, Renewed) {
-        self.remeshed_with(scan, tree, None)
-    }
-
-    /// As [`Self::remeshed`], on the scan whose detail is kept, where that is there.
-    fn remeshed_with(&self, scan: &TriMesh, tree: &FaceTree, kept: Option<&KeptDetail>) -> (Remesh, Renewed) {
+    /// The patch of everything, by the faces of the lattice.
+    ///
+    /// - `kept`: in place of the scan, where its detail is kept.
+    fn remeshed(&self, scan: &TriMesh, tree: &FaceTree, kept: Option<&KeptDetail>) -> (Remesh, Renewed) {
         let evidence = match kept {
             None => self.evidence(scan, tree, None),
             Some(KeptDetail { scan, tree, agreement, .. }) => self.evidence(scan, tree, Some(agreement)),
         };
-        let (changes, budget) = (self.all_changes(), self.budget(scan));
-        let meshed = |pitch: f64| {
-            let mut remesh = Remesh::new(lattice_of(pitch));
-            let renewed = remesh.renew(&evidence, &changes, &GridChanges::default());
-            (remesh, renewed)
-        };
-        let mut made = meshed(self.params.pitch);
-        for _ in 0..COARSER {
-            let Patch { faces, removed, .. } = &made.1.patch;
-            let faces = self.whole(scan) + faces.len() as f64 - removed.len() as f64;
-            if faces <= budget {
-                break;
-            }
-            // the number of faces falls with the square of the pitch
-            made = meshed(made.0.grid.lattice.pitch * 1.02 * (faces / budget).sqrt());
-        }
-        made
+        let mut remesh = Remesh::new(lattice_of(self.params.pitch()));
+        let renewed = remesh.renew(&evidence, &self.all_changes(), &GridChanges::default(), &CoarseBlocks::default());
+        (remesh, renewed)
     }
+}
+
+/// The support of each vertex of a patch.
+fn support(patch: &Patch, remesh: &Remesh, kept: Option<&KeptDetail>) -> Vec<Support> {
+    let of_moved = |key: &VertexKey| kept.and_then(|kept| kept.support(key));
+    patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key))).collect()
 }
 
 /// What the tip does outside the region is not looked at.
 fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
-    if params.region.is_none_or(|touched| touched.region.contains(&touch.centre)) {
+    if params.region.is_none_or(|region| region.contains(&touch.centre)) {
         history.keep(touch);
     } else {
         history.until_ns = touch.stamp_ns;

@@ -2,6 +2,7 @@
 
 use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
+use crate::reconstruct::contour::coarsening::CoarseBlocks;
 use crate::reconstruct::contour::crossing::Crossings;
 use crate::reconstruct::contour::dual_contouring::contour_in;
 use crate::reconstruct::contour::patched::{Patch, Support};
@@ -48,12 +49,20 @@ impl Remesh {
     }
 
     /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
-    pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Renewed {
+    ///
+    /// - `coarse`: of which all faces are made where one is.
+    pub fn renew(
+        &mut self,
+        evidence: &Evidence<'_>,
+        changes: &GridChanges,
+        late: &GridChanges,
+        coarse: &CoarseBlocks,
+    ) -> Renewed {
         let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
         for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { FURTHER } {
             self.take_up(&changed, &mut core, &mut left);
-            let renewed = self.grow(evidence, core, &left);
+            let renewed = self.grow(evidence, core, &left, coarse);
             let open = renewed.patch.open.iter().map(|open| open.beyond);
             let beyond: LatticeRegion = open.filter(|cell| self.grid.is_beyond(*cell)).collect();
             if beyond.is_empty() {
@@ -62,7 +71,7 @@ impl Remesh {
             changed = self.grid.look_further(evidence, &beyond);
         }
         self.take_up(&changed, &mut core, &mut left);
-        self.grow(evidence, core, &left)
+        self.grow(evidence, core, &left, coarse)
     }
 
     /// The support of a vertex: touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
@@ -107,8 +116,14 @@ impl Remesh {
     /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
     ///
     /// - `left`: cells that are in the region no more.
-    fn grow(&mut self, evidence: &Evidence<'_>, mut core: CellBox, left: &[LatticeNode]) -> Renewed {
-        let mut renewed = self.contoured(evidence, core, left);
+    fn grow(
+        &mut self,
+        evidence: &Evidence<'_>,
+        mut core: CellBox,
+        left: &[LatticeNode],
+        coarse: &CoarseBlocks,
+    ) -> Renewed {
+        let mut renewed = self.contoured(evidence, core, left, coarse);
         for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { GROWTH } {
             let mut has_grown = false;
             for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.grid.can_take(open.beyond)) {
@@ -120,7 +135,7 @@ impl Remesh {
             if !has_grown {
                 break;
             }
-            renewed = self.contoured(evidence, core, left);
+            renewed = self.contoured(evidence, core, left, coarse);
         }
         for open in renewed.patch.open.iter().filter(|open| open.is_scanned) {
             self.wanted.insert(open.beyond, ());
@@ -128,16 +143,23 @@ impl Remesh {
         renewed
     }
 
-    fn contoured(&mut self, evidence: &Evidence<'_>, core: CellBox, left: &[LatticeNode]) -> Renewed {
+    fn contoured(
+        &mut self,
+        evidence: &Evidence<'_>,
+        core: CellBox,
+        left: &[LatticeNode],
+        coarse: &CoarseBlocks,
+    ) -> Renewed {
+        let whole = coarse.around(&core);
         let Self { grid, region, bounds, crossings, .. } = self;
         let lattice = &grid.lattice;
-        let (mut cells, around) = (left.to_vec(), core.widened(2, 2));
+        let (mut cells, around) = (left.to_vec(), whole.widened(2, 2));
         around.each_in(region, |cell, ()| cells.push(cell));
         let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
         scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
-        let values = grid.values_in(&core.widened(1, 1));
-        let patch = contour_in(lattice, region, &core, &values, &cut, |edge| crossings.at(grid, evidence, edge));
+        let values = grid.values_in(&whole.widened(1, 1));
+        let patch = contour_in(lattice, region, &whole, &values, &cut, |edge| crossings.at(grid, evidence, edge));
         Renewed { core, patch, scanned }
     }
 }
