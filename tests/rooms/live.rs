@@ -138,6 +138,47 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     }
 }
 
+/// In a pause faces are merged where the surface is plain; where touches come after it, those of the lattice come again. No crack is
+/// between, and at rest it is what is saved.
+#[test]
+fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
+    let stream = stream(4, 0.2);
+    let (scan, tree, contacts) = (&stream.scan, FaceTree::new(&stream.scan), contacts(&stream));
+    let (mut settles, mut never) = (patcher(&stream), patcher(&stream));
+    let follower = || (scan.clone(), FaceTree::new(scan), Splice::default());
+    let [mut settling, mut following] = [follower(), follower()];
+    let follow = |(mesh, tree, splice): &mut (TriMesh, FaceTree, Splice), delta: &PatchDelta| {
+        splice.begin();
+        assert!(splice.go_on(delta, usize::MAX, mesh, tree).unwrap());
+    };
+    let was = soundness(scan);
+    let rim = |mesh: &TriMesh| rim_length(mesh, &soundness(mesh).rims) * 1e3;
+    for (pause, part) in contacts.chunks(contacts.len() / 4 + 1).enumerate() {
+        for (at, batch) in part.chunks(20).enumerate() {
+            for (patcher, follower) in [(&mut settles, &mut settling), (&mut never, &mut following)] {
+                batch.iter().for_each(|contact| patcher.push(contact));
+                follow(follower, &patcher.renewed(scan, &tree));
+            }
+            // right after the pause, and later
+            if at < 3 || at % 60 == 0 {
+                let [settling, following] = [&settling.0, &following.0];
+                assert!(soundness(settling).bad_edges <= was.bad_edges, "{at} renewals after pause {pause}");
+                let rims = [settling, following].map(rim);
+                assert!((rims[0] - rims[1]).abs() < 0.2, "rims {rims:.1?} mm, {at} renewals after pause {pause}");
+                let is_new = |face| !scan.has_face(face) || scan.corners(face) != settling.corners(face);
+                assert_eq!(intersections(settling, 1e-3, is_new), Vec::<[FaceId; 2]>::new(), "{at} after {pause}");
+            }
+        }
+        follow(&mut settling, &settles.settled(scan, &tree));
+        let mut all = settles.copy();
+        all.flush();
+        let saved = all.patched(scan, &tree).unwrap().mesh;
+        assert!(triangles(&settling.0) == triangles(&saved), "pause {pause}");
+        let [merged, fine] = [&settling.0, &following.0].map(|mesh| mesh.face_count() as f64);
+        assert!(merged < 0.9 * fine, "{merged} of {fine} faces in pause {pause}");
+    }
+}
+
 /// The same by hand, on one thread.
 fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
     let tree = FaceTree::new(&stream.scan);

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::mesh::triangle::{Extent, are_apart, extent, meet};
 use crate::mesh::{FaceId, TriMesh, VertexId, triangle};
 use crate::numeric::{direction, length_and_direction};
 
@@ -46,14 +47,14 @@ impl Pairs {
         &mut self,
         mesh: &TriMesh,
         face: FaceId,
-        others: &[(FaceId, Corners)],
+        others: &[(FaceId, Extent)],
         margin: f64,
         is_wanted: impl Fn(FaceId) -> bool,
         is_smooth: impl Fn(VertexId) -> bool,
     ) {
-        let (here, corners) = (bounds(&mesh.triangle(face)), mesh.corners(face));
+        let (here, corners) = (extent(&mesh.triangle(face)), mesh.corners(face));
         for &(other, there) in others {
-            if apart(&here, &there, margin) || !is_wanted(other) {
+            if are_apart(&here, &there, margin) || !is_wanted(other) {
                 continue;
             }
             let others = mesh.corners(other);
@@ -107,40 +108,12 @@ impl Pairs {
     }
 }
 
-/// Lowest and highest coordinates, m.
-pub(super) type Corners = (Vector3<f64>, Vector3<f64>);
-
-#[inline]
-pub(super) fn bounds([a, b, c]: &TrianglePoints) -> Corners {
-    (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
-}
-
-#[inline]
-fn apart(a: &Corners, b: &Corners, gap: f64) -> bool {
-    (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
-}
-
-/// Whether two faces that share no edge meet, other than in their common corner.
-fn meet(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> bool {
-    if apart(&bounds(t), &bounds(u), gap) {
-        return false;
-    }
-    let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else { return triangle::intersect(t, u, gap) };
-    triangle::segment_crosses(&t[(i + 1) % 3], &t[(i + 2) % 3], u, 0.0)
-        || triangle::segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
-}
-
-/// Whether two faces with a common corner, at these places in each, meet beside it.
-pub(super) fn meet_at_corner([t, u]: &[TrianglePoints; 2], common: [u8; 2], gap: f64) -> bool {
-    meet(t, u, Some(common), gap)
-}
-
 /// How far every vertex may move before two faces can meet, m; 0 when there is no simple bound.
 fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> f64 {
     match common.map(|pair| pair.map(usize::from)) {
         Some([i, j]) => margin_at_corner(t, i, u, j).max(margin_at_corner(u, j, t, i)),
         None => {
-            let (a, b) = (bounds(t), bounds(u));
+            let (a, b) = (extent(t), extent(u));
             let boxes = (0..3).map(|i| (a.0[i] - b.1[i]).max(b.0[i] - a.1[i])).fold(f64::NEG_INFINITY, f64::max);
             let widest = boxes.max(height_above(t, u)).max(height_above(u, t));
             // both faces may come closer

@@ -2,10 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::collision::meet_at_corner;
 use super::ring::Ring;
 use super::scratch_map::ScratchMap;
-use crate::mesh::{FaceId, TriMesh, VertexId};
+use crate::mesh::{FaceId, TriMesh, VertexId, triangle};
 use crate::numeric::direction;
 
 /// The smooth fans around the corners of a region that moves.
@@ -165,8 +164,9 @@ fn is_fan_clear(mesh: &TriMesh, corner: VertexId, gap: f64, before: impl Fn(Vert
         }
         let at = |corners: &[VertexId; 3]| corners.iter().position(|&other| other == corner).unwrap_or(0) as u8;
         let common = [at(&a), at(&b)];
-        let now = [a, b].map(|corners| corners.map(|vertex| mesh.position(vertex)));
-        !meet_at_corner(&now, common, gap) || meet_at_corner(&[a, b].map(|corners| corners.map(&before)), common, gap)
+        let meet = |[t, u]: [[Point3<f64>; 3]; 2]| triangle::meet(&t, &u, Some(common), gap);
+        !meet([a, b].map(|corners| corners.map(|vertex| mesh.position(vertex))))
+            || meet([a, b].map(|corners| corners.map(&before)))
     })
 }
 

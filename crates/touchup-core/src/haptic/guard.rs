@@ -4,10 +4,11 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::collision::{Corners, Pairs, bounds};
+use super::collision::Pairs;
 use super::fans::Fans;
 use super::ring::Ring;
 use super::scratch_map::ScratchMap;
+use crate::mesh::triangle::{Extent, extent};
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, VertexId, triangle};
 use crate::numeric::{direction, length_and_direction};
 use crate::parameters;
@@ -120,7 +121,7 @@ pub(super) struct Neighbourhood {
     unseen: f64,
     near: BoxQuery,
     /// the faces nearby with their boxes
-    boxes: Vec<(FaceId, Corners)>,
+    boxes: Vec<(FaceId, Extent)>,
     /// corners that hang together with the region
     reached: ScratchMap,
 }
@@ -181,7 +182,7 @@ impl Neighbourhood {
         self.find_near(mesh, tree, margin);
         self.suspects.clear();
         self.boxes.clear();
-        self.boxes.extend(self.near.faces.iter().map(|&face| (face, bounds(&mesh.triangle(face)))));
+        self.boxes.extend(self.near.faces.iter().map(|&face| (face, extent(&mesh.triangle(face)))));
         let before = &self.before;
         self.fans.find(mesh, &self.ring, SMOOTH_COSINE, |number| before[number as usize].normal);
         for (moving, &face) in self.ring.moving().iter().enumerate() {

@@ -144,6 +144,33 @@ pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
     (0..3).any(|i| segment_crosses(&t[i], &t[(i + 1) % 3], u, gap) || segment_crosses(&u[i], &u[(i + 1) % 3], t, gap))
 }
 
+/// Lowest and highest coordinates, m.
+pub(crate) type Extent = (Vector3<f64>, Vector3<f64>);
+
+/// The extent of a triangle.
+#[inline]
+pub(crate) fn extent([a, b, c]: &[Point3<f64>; 3]) -> Extent {
+    (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
+}
+
+/// Whether two extents are farther than `gap` (m) from each other along some axis.
+#[inline]
+pub(crate) fn are_apart(a: &Extent, b: &Extent, gap: f64) -> bool {
+    (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
+}
+
+/// Whether two triangles that share no edge meet, other than in their common corner, or come within `gap` (m) as in [`intersect`].
+///
+/// - `common`: index of the common corner in either.
+pub(crate) fn meet(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], common: Option<[u8; 2]>, gap: f64) -> bool {
+    if are_apart(&extent(t), &extent(u), gap) {
+        return false;
+    }
+    let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else { return intersect(t, u, gap) };
+    segment_crosses(&t[(i + 1) % 3], &t[(i + 2) % 3], u, 0.0)
+        || segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
+}
+
 /// The square of the longest edge, m².
 #[inline]
 pub(crate) fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {

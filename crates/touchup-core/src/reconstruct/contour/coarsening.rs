@@ -8,9 +8,9 @@ use std::collections::HashSet;
 use meshopt::SimplifyOptions;
 use nalgebra::{Point3, center};
 
-use crate::mesh::triangle;
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, triangle};
 use crate::reconstruct::contour::patched::{Patch, Support};
-use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, PatchFace};
+use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, Owner, PatchFace};
 use crate::reconstruct::table::CellTable;
 
 /// Side of a block, in cells.
@@ -63,43 +63,142 @@ impl CoarseBlocks {
 }
 
 /// Merges faces of a patch that belong to the lattice, where no point of the surface moves by more than `tolerance` (m) and vertices of
-/// one support go into vertices of the same. Vertices stay where they are, or go. O(faces).
+/// one support go into vertices of the same. Vertices stay where they are, or go; a block stays as it is where merged faces would meet
+/// others. O(faces).
 ///
 /// - `support`: of each vertex of the patch.
-pub(in crate::reconstruct) fn coarsen(patch: &mut Patch, support: &[Support], tolerance: f64) -> CoarseBlocks {
-    let mut fine: CellTable<LatticeNode, Vec<PatchFace>> = CellTable::default();
+/// - `scan`: that the patch is for, with the tree over its faces.
+pub(in crate::reconstruct) fn coarsen(
+    patch: &mut Patch,
+    support: &[Support],
+    lattice: &Lattice,
+    (scan, tree): (&TriMesh, &FaceTree),
+    tolerance: f64,
+) -> CoarseBlocks {
+    let mut blocks: CellTable<LatticeNode, Vec<PatchFace>> = CellTable::default();
     let mut others = Vec::new();
     for face in std::mem::take(&mut patch.faces) {
         match face.owner.node() {
-            Some(node) => fine.get_or_default(block_of(node)).push(face),
+            Some(node) => blocks.get_or_default(block_of(node)).push(face),
             None => others.push(face),
         }
     }
     let position = |vertex: u32| patch.vertices.entry(vertex).1;
-    let coarse = |(_, faces): (LatticeNode, &Vec<PatchFace>)| coarsened(faces, support, position, tolerance);
-    let mut coarse: Vec<Option<Vec<PatchFace>>> = fine.iter().map(coarse).collect();
+    let replaced: HashSet<FaceId> = patch.removed.iter().copied().collect();
+    let merged = |(_, faces): (LatticeNode, &Vec<PatchFace>)| merged(faces, support, position, tolerance);
+    let mut coarse: Vec<Option<Vec<PatchFace>>> = blocks.iter().map(merged).collect();
     loop {
-        let of =
-            |(at, (_, faces)): (usize, (LatticeNode, &Vec<PatchFace>))| coarse[at].as_ref().unwrap_or(faces).clone();
-        let by_block: Vec<Vec<PatchFace>> = fine.iter().enumerate().map(of).collect();
-        // two blocks may join the same two corners of the rim between them
-        let double = double_edges(by_block.iter().flatten().chain(&others));
-        let is_double = |face: &PatchFace| sides(face).iter().any(|side| double.contains(side));
-        let mut has_changed = false;
-        for (coarse, faces) in coarse.iter_mut().zip(&by_block).filter(|_| !double.is_empty()) {
-            has_changed |= coarse.is_some() && faces.iter().any(is_double) && coarse.take().is_some();
+        let mut all = PlacedFaces::new(lattice, position);
+        others.iter().for_each(|face| all.take(*face, None));
+        for (at, (_, fine)) in blocks.iter().enumerate() {
+            match &coarse[at] {
+                Some(merged) => merged.iter().for_each(|face| all.take(*face, Some(at))),
+                None => fine.iter().for_each(|face| all.take(*face, None)),
+            }
         }
-        if !has_changed {
-            patch.faces = others;
-            patch.faces.extend(by_block.into_iter().flatten());
+        let mut unsound = all.unsound();
+        unsound.extend(all.piercing(scan, tree, &replaced));
+        if unsound.is_empty() {
+            patch.faces = all.faces.into_iter().map(|(face, _)| face).collect();
             break;
         }
+        unsound.into_iter().for_each(|at| coarse[at] = None);
     }
-    CoarseBlocks(fine.iter().zip(coarse).filter(|(_, coarse)| coarse.is_some()).map(|((block, _), _)| block).collect())
+    let is_coarse = blocks.iter().zip(&coarse).filter(|(_, coarse)| coarse.is_some());
+    CoarseBlocks(is_coarse.map(|((block, _), _)| block).collect())
+}
+
+/// The faces of a patch, merged and not, and where they are.
+struct PlacedFaces<'a, P> {
+    lattice: &'a Lattice,
+    position: P,
+    /// each with the number of the block whose faces were merged to it
+    faces: Vec<(PatchFace, Option<usize>)>,
+    /// the numbers of the faces that reach into a block
+    reach: CellTable<LatticeNode, Vec<u32>>,
+}
+
+impl<'a, P: Fn(u32) -> Point3<f64>> PlacedFaces<'a, P> {
+    fn new(lattice: &'a Lattice, position: P) -> Self {
+        Self { lattice, position, faces: Vec::new(), reach: CellTable::default() }
+    }
+
+    fn triangle(&self, face: &PatchFace) -> [Point3<f64>; 3] {
+        face.corners.map(&self.position)
+    }
+
+    /// The blocks that a face reaches into.
+    fn blocks(&self, face: &PatchFace) -> CellBox {
+        let (low, high) = triangle::extent(&self.triangle(face));
+        let [lo, hi] = [low, high].map(|corner| block_of(self.lattice.cell_of(&Point3::from(corner))));
+        CellBox { lo, hi }
+    }
+
+    fn take(&mut self, face: PatchFace, block: Option<usize>) {
+        let number = self.faces.len() as u32;
+        self.blocks(&face).each(|block| self.reach.get_or_default(block).push(number));
+        self.faces.push((face, block));
+    }
+
+    /// The merged faces, with their blocks.
+    fn merged(&self) -> impl Iterator<Item = (u32, &PatchFace, usize)> {
+        (0..).zip(&self.faces).filter_map(|(number, (face, block))| Some((number, face, (*block)?)))
+    }
+
+    /// The blocks with a merged face that has a side as another face has it, or meets another face. Two blocks may join the same two
+    /// corners of the rim between them.
+    fn unsound(&self) -> HashSet<usize> {
+        let mut sides: Vec<[u32; 2]> = self.faces.iter().flat_map(|(face, _)| sides(&face.corners)).collect();
+        sides.sort_unstable();
+        let double: HashSet<[u32; 2]> =
+            sides.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+        let mut unsound = HashSet::new();
+        for (number, face, block) in self.merged() {
+            let triangle = self.triangle(face);
+            let mut is_unsound = self::sides(&face.corners).iter().any(|side| double.contains(side));
+            self.blocks(face).each_in(&self.reach, |_, near| {
+                for &other in near.iter().filter(|&&other| other != number) {
+                    let (other, of) = &self.faces[other as usize];
+                    if meet_beside(&triangle, &self.triangle(other), &face.corners, &other.corners) {
+                        is_unsound = true;
+                        unsound.extend(of);
+                    }
+                }
+            });
+            unsound.extend(is_unsound.then_some(block));
+        }
+        unsound
+    }
+
+    /// The blocks with a merged face that meets one of the scan's that is not `replaced`.
+    fn piercing(&self, scan: &TriMesh, tree: &FaceTree, replaced: &HashSet<FaceId>) -> HashSet<usize> {
+        let mut query = BoxQuery::default();
+        let mut piercing = HashSet::new();
+        for (_, face, block) in self.merged() {
+            let triangle = self.triangle(face);
+            let (low, high) = triangle::extent(&triangle);
+            tree.faces_in_box(&Point3::from(low), &Point3::from(high), &mut query);
+            let meets = |other: &&FaceId| {
+                !replaced.contains(other) && triangle::meet(&triangle, &scan.triangle(**other), None, 0.0)
+            };
+            piercing.extend(query.faces.iter().find(meets).map(|_| block));
+        }
+        piercing
+    }
+}
+
+/// Whether two faces meet, other than in a common corner; those that share a side fold, they do not pierce.
+fn meet_beside(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], t_corners: &[u32; 3], u_corners: &[u32; 3]) -> bool {
+    let mut common = (0..3u8).filter_map(|i| {
+        let at = u_corners.iter().position(|other| *other == t_corners[usize::from(i)])?;
+        Some([i, at as u8])
+    });
+    let first = common.next();
+    common.next().is_none() && triangle::meet(t, u, first, 0.0)
 }
 
 /// The faces of a block, merged; `None` where that leaves as many.
-fn coarsened(
+fn merged(
     faces: &[PatchFace],
     support: &[Support],
     position: impl Fn(u32) -> Point3<f64>,
@@ -168,22 +267,13 @@ fn is_same_surface(faces: &[u32], merged: &[u32], places: &[Point3<f64>], tolera
         && new.flat_map(|(_, triangle)| between(triangle)).all(|p| is_near(&p, &before))
 }
 
-fn sides(face: &PatchFace) -> [[u32; 2]; 3] {
-    let [a, b, c] = face.corners;
-    [[a, b], [b, c], [c, a]]
-}
-
-/// Sides that faces have in the same direction.
-fn double_edges<'a>(faces: impl Iterator<Item = &'a PatchFace>) -> HashSet<[u32; 2]> {
-    let mut all: Vec<[u32; 2]> = faces.flat_map(sides).collect();
-    all.sort_unstable();
-    all.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
+fn sides([a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
+    [[*a, *b], [*b, *c], [*c, *a]]
 }
 
 /// Sides without a face on the other side, in order.
 fn rim(faces: &[u32]) -> Vec<[u32; 2]> {
-    let sides = |face: &[u32]| [[face[0], face[1]], [face[1], face[2]], [face[2], face[0]]];
-    let all: HashSet<[u32; 2]> = faces.chunks_exact(3).flat_map(sides).collect();
+    let all: HashSet<[u32; 2]> = faces.chunks_exact(3).flat_map(|face| sides(&[face[0], face[1], face[2]])).collect();
     let mut rim: Vec<_> = all.iter().filter(|[a, b]| !all.contains(&[*b, *a])).copied().collect();
     rim.sort_unstable();
     rim
@@ -214,6 +304,15 @@ mod tests {
         patch
     }
 
+    /// What [`coarsen`] leaves of a sheet whose vertices have these supports, far from its scan.
+    fn coarsened(mut patch: Patch, support: &[Support], tolerance: f64) -> (Patch, CoarseBlocks) {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| Point3::new(x, y, -1.0));
+        let scan = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let lattice = Lattice { origin: Point3::origin(), pitch: 1e-3 };
+        let coarse = coarsen(&mut patch, support, &lattice, (&scan, &FaceTree::new(&scan)), tolerance);
+        (patch, coarse)
+    }
+
     fn area(patch: &Patch) -> f64 {
         let doubled = patch.faces.iter().map(|face| {
             let [a, b, c] = face.corners.map(|corner| patch.vertices.entry(corner).1);
@@ -224,36 +323,48 @@ mod tests {
 
     #[test]
     fn a_plane_keeps_the_rims_of_its_blocks() {
-        let mut patch = sheet(16, |_, _| 0.0);
-        let support = vec![Support::Touched; patch.vertices.len()];
-        let coarse = coarsen(&mut patch, &support, 1e-6);
+        let (patch, coarse) = coarsened(sheet(16, |_, _| 0.0), &[Support::Touched; 17 * 17], 1e-6);
         assert_eq!(coarse.0.len(), 4);
         // a disk of triangles whose rim has 32 vertices has 30 faces, and two more for each vertex inside: some are left where the
         // collapse of a further edge would turn a face over
         assert!(patch.faces.len() <= 4 * 36, "{} of 512", patch.faces.len());
         assert!((area(&patch) - 256e-6).abs() < 1e-12);
-        assert!(double_edges(patch.faces.iter()).is_empty());
+        let mut sides: Vec<_> = patch.faces.iter().flat_map(|face| sides(&face.corners)).collect();
+        let count = sides.len();
+        sides.sort_unstable();
+        sides.dedup();
+        assert_eq!(sides.len(), count, "no two faces have a side in the same direction");
     }
 
     #[test]
     fn what_is_farther_than_the_tolerance_stays() {
         let bump = |x: i32, y: i32| if (x, y) == (4, 4) { 0.1e-3 } else { 0.0 };
-        let support = vec![Support::Touched; 81];
         let top = |patch: &Patch| patch.faces.iter().any(|face| face.corners.contains(&(4 * 9 + 4)));
-        let [mut kept, mut merged] = [sheet(8, bump), sheet(8, bump)];
-        coarsen(&mut kept, &support, 0.05e-3);
+        let within = |tolerance: f64| coarsened(sheet(8, bump), &[Support::Touched; 81], tolerance).0;
+        let kept = within(0.05e-3);
         assert!(top(&kept) && kept.faces.len() < 128);
-        coarsen(&mut merged, &support, 0.2e-3);
-        assert!(!top(&merged));
+        assert!(!top(&within(0.2e-3)));
     }
 
     #[test]
     fn supports_do_not_mix() {
-        let mut patch = sheet(8, |_, _| 0.0);
         let guessed = |at: usize| if at == 4 * 9 + 4 { Support::Guessed } else { Support::Touched };
         let support: Vec<Support> = (0..81).map(guessed).collect();
-        coarsen(&mut patch, &support, 1e-6);
+        let (patch, _) = coarsened(sheet(8, |_, _| 0.0), &support, 1e-6);
         assert!(patch.faces.iter().any(|face| face.corners.contains(&(4 * 9 + 4))));
+    }
+
+    /// A bump of the scan pierces what the faces of a block would be merged to, and not the faces themselves.
+    #[test]
+    fn a_block_whose_merged_faces_would_meet_the_scan_stays() {
+        let dent = |x: i32, y: i32| if (x, y) == (4, 4) { -0.1e-3 } else { 0.0 };
+        let tip = Point3::new(4.05e-3, 4.05e-3, -0.05e-3);
+        let away = [[-1e-4, 0.0], [1e-4, 0.0], [0.0, 1e-4]].map(|[x, y]| tip + nalgebra::Vector3::new(x, y, 1e-3));
+        let scan = TriMesh::new([&[tip], &away[..2]].concat(), vec![[0, 1, 2]]).unwrap();
+        let lattice = Lattice { origin: Point3::origin(), pitch: 1e-3 };
+        let mut patch = sheet(8, dent);
+        let coarse = coarsen(&mut patch, &[Support::Touched; 81], &lattice, (&scan, &FaceTree::new(&scan)), 0.2e-3);
+        assert!(coarse.0.is_empty() && patch.faces.len() == 128);
     }
 
     #[test]

@@ -342,8 +342,7 @@ impl Patcher {
         self.update(scan, tree);
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
         let (remesh, Renewed { mut patch, .. }) = self.remeshed(scan, tree, kept.as_ref());
-        let known = support(&patch, &remesh, kept.as_ref());
-        coarsen(&mut patch, &known, self.params.tolerance);
+        let (known, _) = self.coarsen(&mut patch, &remesh, kept.as_ref(), (scan, tree));
         let (base, moved) = kept.map_or_else(|| (scan.clone(), Vec::new()), |kept| (kept.scan, kept.moved));
         let (mesh, ids) = patch.applied_to(base)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
@@ -413,8 +412,7 @@ impl Patcher {
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         let all = self.flushed(scan, tree);
         let ((remesh, mut renewed), until_ns) = (all.remeshed(scan, tree, None), all.history.until_ns);
-        let known = support(&renewed.patch, &remesh, None);
-        let coarse = coarsen(&mut renewed.patch, &known, self.params.tolerance);
+        let (_, coarse) = self.coarsen(&mut renewed.patch, &remesh, None, (scan, tree));
         let mut live = self.live.take().unwrap_or_default();
         (live.remesh, live.is_outdated) = (remesh, false);
         let delta = live.published.take_all(renewed, coarse, &live.remesh, scan);
@@ -432,8 +430,7 @@ impl Patcher {
         let all = self.flushed(scan, tree);
         let kept = KeptDetail::of(&all.evidence(scan, tree, None));
         let (remesh, mut renewed) = all.remeshed(scan, tree, kept.as_ref());
-        let known = support(&renewed.patch, &remesh, kept.as_ref());
-        let coarse = coarsen(&mut renewed.patch, &known, self.params.tolerance);
+        let (_, coarse) = self.coarsen(&mut renewed.patch, &remesh, kept.as_ref(), (scan, tree));
         let base = kept.as_ref().map_or(scan, |kept| &kept.scan);
         let mut delta = PublishedPatch::default().take_all(renewed, coarse, &remesh, base);
         for vertex in &mut delta.vertices {
@@ -498,12 +495,24 @@ impl Patcher {
         let renewed = remesh.renew(&evidence, &self.all_changes(), &GridChanges::default(), &CoarseBlocks::default());
         (remesh, renewed)
     }
-}
 
-/// The support of each vertex of a patch.
-fn support(patch: &Patch, remesh: &Remesh, kept: Option<&KeptDetail>) -> Vec<Support> {
-    let of_moved = |key: &VertexKey| kept.and_then(|kept| kept.support(key));
-    patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key))).collect()
+    /// Merges faces of a patch within the tolerance; returns the support of its vertices, and where faces were merged.
+    ///
+    /// - `remesh`, `kept`: by which it was made.
+    fn coarsen(
+        &self,
+        patch: &mut Patch,
+        remesh: &Remesh,
+        kept: Option<&KeptDetail>,
+        scan: (&TriMesh, &FaceTree),
+    ) -> (Vec<Support>, CoarseBlocks) {
+        let of_moved = |key: &VertexKey| kept.and_then(|kept| kept.support(key));
+        let support = patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key)));
+        let support: Vec<Support> = support.collect();
+        let scan = kept.map_or(scan, |kept| (&kept.scan, &kept.tree));
+        let coarse = coarsen(patch, &support, &remesh.grid.lattice, scan, self.params.tolerance);
+        (support, coarse)
+    }
 }
 
 /// What the tip does outside the region is not looked at.
