@@ -111,7 +111,7 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
             assert_eq!(intersections(&mesh, 1e-3, is_new), Vec::<[FaceId; 2]>::new(), "after {renewals} renewals");
         }
     });
-    let whole = patcher.patched(scan, &tree).unwrap().mesh;
+    let whole = by_lattice(scan, &tree, &patcher);
     let faces = [&mesh, &whole].map(|mesh| mesh.face_count() as f64);
     // 13868 of 13900
     assert!((faces[0] / faces[1] - 1.0).abs() < 0.004, "{faces:?} faces bit by bit and at once");
@@ -177,6 +177,15 @@ fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
         let [merged, fine] = [&settling.0, &following.0].map(|mesh| mesh.face_count() as f64);
         assert!(merged < 0.9 * fine, "{merged} of {fine} faces in pause {pause}");
     }
+}
+
+/// The patch of all touches at once, by the faces of the lattice, none of them merged.
+fn by_lattice(scan: &TriMesh, tree: &FaceTree, patcher: &Patcher) -> TriMesh {
+    let (mut mesh, mut mesh_tree, mut splice) = (scan.clone(), FaceTree::new(scan), Splice::default());
+    splice.begin();
+    let delta = patcher.copy().renewed(scan, tree);
+    assert!(splice.go_on(&delta, usize::MAX, &mut mesh, &mut mesh_tree).unwrap());
+    mesh
 }
 
 /// The same by hand, on one thread.
@@ -520,8 +529,10 @@ fn undoing_while_touching_brings_the_mesh_back() {
     before.flush();
     let (mesh, rebuilt) = (live.refiner().mesh().clone(), live.finish().unwrap().patcher.unwrap());
     assert!(redone == triangles(&mesh));
-    assert!(redone == whole(&stream, &rebuilt).0, "and redone what all of them make");
+    let tree = FaceTree::new(&stream.scan);
+    let of = |patcher: &Patcher| triangles(&by_lattice(&stream.scan, &tree, patcher));
+    assert!(redone == of(&rebuilt), "and redone what all of them make");
     let close = |a: usize, b: usize| (a as f64 / b as f64 - 1.0).abs() < 0.01;
-    assert!(close(undone.len(), whole(&stream, &before).0.len()));
+    assert!(close(undone.len(), of(&before).len()));
     assert!(close(touched.len(), redone.len()));
 }

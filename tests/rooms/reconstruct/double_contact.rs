@@ -193,7 +193,8 @@ fn what_the_ball_cannot_reach_is_marked() {
     }
     println!("in the corner {fillet:?}, on the walls {walls:?}: reachable, not");
     assert!(fillet[1] > 50 && fillet[1] > 10 * fillet[0], "{fillet:?}");
-    assert!(walls[0] > 500 && walls[0] > 100 * walls[1], "{walls:?}");
+    // few: faces of a plane are merged
+    assert!(walls[0] > 100 && walls[0] > 100 * walls[1], "{walls:?}");
 }
 
 #[test]

@@ -199,7 +199,8 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
             off * 1e6,
             z.rms()
         );
-        assert!(z.all.len() > 4000, "{name}: {}", z.all.len());
+        // what merging leaves of some 5,000
+        assert!(z.all.len() > 2000, "{name}: {}", z.all.len());
         let by = |shift: f64| mean(&sigmas.iter().map(|sigma| (shift / sigma).powi(2)).collect::<Vec<_>>());
         (off, z.rms(), shares[1], [by(20e-6), by(11.4e-6)])
     };

@@ -20,6 +20,9 @@ const FEW: usize = 4;
 /// Errors that are asked of the simplification, as shares of the tolerance: its own measure of error is a mean over planes.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
+/// Twice the area over the longest side squared below which no merged face is: a triangle stretched thirtyfold.
+const THIN: f64 = 0.03;
+
 fn block_of(node: LatticeNode) -> LatticeNode {
     node.map(|x| x.div_euclid(BLOCK))
 }
@@ -240,7 +243,7 @@ fn merged(
 }
 
 /// Whether `merged` are faces for the same rim as `faces`, and the two surfaces are nowhere farther than `tolerance` (m) from each other, by
-/// the corners of the one and by corners, sides and middles of the other.
+/// the corners of the one and by corners, sides and middles of the other; and no new face is thin.
 fn is_same_surface(faces: &[u32], merged: &[u32], places: &[Point3<f64>], tolerance: f64) -> bool {
     if rim(faces) != rim(merged) {
         return false;
@@ -260,6 +263,11 @@ fn is_same_surface(faces: &[u32], merged: &[u32], places: &[Point3<f64>], tolera
     let gone = places.iter().zip(&is_left).filter(|(_, is_left)| !**is_left);
     let known: HashSet<&[u32]> = faces.chunks_exact(3).collect();
     let new = merged.chunks_exact(3).zip(&after).filter(|(face, _)| !known.contains(face));
+    let is_thin =
+        |[a, b, c]: &[Point3<f64>; 3]| triangle::shape_quality(&[*a, *b, *c], (b - a).cross(&(c - a)).norm()) < THIN;
+    if new.clone().any(|(_, triangle)| is_thin(triangle)) {
+        return false;
+    }
     let between = |[a, b, c]: &[Point3<f64>; 3]| {
         [center(a, b), center(b, c), center(c, a), Point3::from((a.coords + b.coords + c.coords) / 3.0)]
     };
