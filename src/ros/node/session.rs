@@ -61,7 +61,7 @@ pub struct NodeSession {
     pub epoch: Epoch,
     /// what was refused
     pub counters: Counters,
-    /// of one sample through the haptic update
+    /// work for one sample: answer, and what follows it
     pub pushes: Latencies,
     /// from the arrival of what completed a sample to the mesh
     pub latencies: Latencies,
@@ -104,7 +104,7 @@ pub struct SessionReport {
     pub contacts: u64,
     /// updates made smaller because a face would have folded
     pub cut_back: u64,
-    /// of one sample through the haptic update, ns
+    /// work for one sample: its answer, and following the patch before the next one, ns
     pub push_ns: Quantiles,
     /// from the arrival of what completed a sample to the mesh, ns
     pub latency_ns: Quantiles,
