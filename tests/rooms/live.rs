@@ -15,7 +15,7 @@ use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
-const AT_ONCE: usize = 40;
+const AT_ONCE: usize = 80;
 /// The same on every machine.
 const PATIENT: Pace = Pace { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: true };
 /// Time between renewals, ns.

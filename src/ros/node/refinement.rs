@@ -332,6 +332,7 @@ impl RefinementWorker {
                 let followed = self.session.engine.follow();
                 let work = answered.saturating_duration_since(begun) + self.setup.clock.since(following);
                 self.session.pushes.record(work);
+                self.note_patch_behind(sample.stamp_ns);
                 match followed {
                     Ok(()) => self.note_changes(),
                     Err(error) => self.fail(&error),
@@ -340,6 +341,13 @@ impl RefinementWorker {
             Err(LiveError::Refine(error)) => self.session.counters.refuse(reason_of(&error)),
             Err(error) => self.fail(&error),
         }
+    }
+
+    fn note_patch_behind(&mut self, stamp_ns: i64) {
+        let Some(until_ns) = self.session.engine.patched_until_ns() else { return };
+        let behind = Duration::from_nanos(stamp_ns.saturating_sub(until_ns).max(0) as u64);
+        self.session.behind.record(behind);
+        self.session.behind_lately.record(behind);
     }
 
     pub(super) fn fail(&mut self, error: &LiveError) {

@@ -345,7 +345,7 @@ impl Engine {
         }
     }
 
-    /// Stamp of the last sample that the patch in the mesh knows, ns; `None` before the patch has seen a touch, and where it is made
+    /// Stamp of the last sample that the patch knows whose changes are all in the mesh, ns; `None` before the patch has seen a touch, and where it is made
     /// at the end.
     pub fn patched_until_ns(&self) -> Option<i64> {
         self.renewals()?.patched_until_ns()
