@@ -9,12 +9,14 @@
 //!
 //! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
 
+mod memory;
 mod sliding;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, percentile, resident};
+use memory::resident;
+use sliding::{SCAN_NOISE, percentile};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;

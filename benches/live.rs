@@ -8,12 +8,14 @@
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.
 
+mod memory;
 mod sliding;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, percentile, resident};
+use memory::resident;
+use sliding::{SCAN_NOISE, percentile};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
