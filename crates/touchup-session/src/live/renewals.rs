@@ -30,10 +30,10 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// 6 ms and 10 ms: with a smoothing window of 32 ms to either side, the mesh shows a touch after 50 ms, the last two for taking the change
-    /// up. No sample waits.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms, and the time that it takes to take
+    /// the change up. No sample waits.
     fn default() -> Self {
-        Self { every_ns: 6_000_000, after_ns: 10_000_000, is_patient: false }
+        Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
     }
 }
 
