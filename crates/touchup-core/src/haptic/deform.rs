@@ -73,8 +73,8 @@ pub(super) struct HandleRegion {
     size: RoiSize,
     refit: RefitPlan,
     seen: Option<u64>,
-    /// whether its neighbourhood was weighed since it was refreshed
-    is_weighed: bool,
+    /// whether the motion that needs no look was bounded since the region was refreshed
+    is_bounded: bool,
 }
 
 impl DeformableMesh {
@@ -140,7 +140,7 @@ impl DeformableMesh {
             size,
             refit: RefitPlan::with_room(3 * vertices),
             seen: None,
-            is_weighed: false,
+            is_bounded: false,
         }
     }
 
@@ -157,7 +157,7 @@ impl DeformableMesh {
                 region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, gap);
             }
             region.refit.spend();
-            (region.seen, region.is_weighed) = (Some(self.edits), false);
+            (region.seen, region.is_bounded) = (Some(self.edits), false);
         }
     }
 
@@ -282,8 +282,8 @@ impl DeformableMesh {
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
     fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> RegionFit {
         let margin = MARGIN_EDGES * self.mean_edge;
-        if !std::mem::replace(&mut region.is_weighed, true) {
-            region.roi.neighbourhood.weigh(&self.mesh, &self.evidence(guard));
+        if !std::mem::replace(&mut region.is_bounded, true) {
+            region.roi.neighbourhood.bound_unseen(&self.mesh, &self.evidence(guard));
         } else if region.roi.neighbourhood.is_outdated(longest) {
             region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }

@@ -150,7 +150,7 @@ impl Neighbourhood {
         self.reached.reserve(4 * faces);
     }
 
-    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen then, before [`Self::weigh`].
+    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen then, before [`Self::bound_unseen`].
     ///
     /// - `gap`: as in [`GuardEvidence`].
     pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
@@ -164,7 +164,7 @@ impl Neighbourhood {
     }
 
     /// Finds how far the vertices of a refreshed region may move unseen; `evidence` as in [`Self::judge`].
-    pub fn weigh(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
+    pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
             self.after.clear();
             self.after.extend_from_slice(&self.before[..self.ring.moving]);

@@ -345,8 +345,8 @@ impl Engine {
         }
     }
 
-    /// Stamp of the last sample that the patch knows whose changes are all in the mesh, ns; `None` before the patch has seen a touch, and where it is made
-    /// at the end.
+    /// Stamp up to which the mesh shows all that the patch knows, ns; `None` before the patch has seen a touch, and where it is made at the
+    /// end.
     pub fn patched_until_ns(&self) -> Option<i64> {
         self.renewals()?.patched_until_ns()
     }
