@@ -64,6 +64,9 @@ struct Second {
     memory: Option<f64>,
 }
 
+/// Which of its times.
+type TimesOf = fn(&Second) -> Option<Times>;
+
 /// The run, second by second.
 ///
 /// - `memory`: of the node, MB, with the time at which it was that, ns since 1970.
@@ -146,7 +149,7 @@ fn table(seconds: &[Second]) -> Table {
     let mut table = Table::of("live_seconds", "Second by second", 0..seconds.len())
         .column("time, s", |at| at + 1)
         .column("samples not answered", |at| second(at).unanswered as usize);
-    let parts: [(&str, fn(&Second) -> Option<Times>); 3] = [
+    let parts: [(&str, TimesOf); 3] = [
         ("answer", |second| second.answer),
         ("patch", |second| Some(second.shown?.0)),
         ("viewer", |second| second.drawn),
