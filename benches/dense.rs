@@ -1,19 +1,22 @@
-//! Cost of one sample on scans of any density: [`Engine::push`] for edges from a thirtieth of the tip's radius to twice that, and from
-//! 10 thousand to 5 million faces.
+//! Cost of one sample on scans of any density: [`Engine::answer`] and [`Engine::follow`] for edges from a thirtieth of the tip's radius to
+//! twice that, and from 10 thousand to 5 million faces.
 //!
 //! A ball slides over a wavy plate in a raster at 1 kHz, with contacts a little below the scan. One line for each density and size:
-//! time to begin, times of a push, how many vertices a push may move, memory of the process. As a recording is replayed, as fast as
-//! samples can be read, with the patch made at the end; with `live` in real time, the patch on a thread of its own: how old the
-//! touches are that it shows, and how many of its renewals were late.
+//! time to begin, time from a sample to its answer and until the next one is awaited, how many vertices a sample may move, memory of the
+//! process. As a recording is replayed, as fast as samples can be read, with the patch made at the end; with `live` in real time, the patch
+//! on a thread of its own: how old the touches are that it shows, and how many of its renewals were late. A sample that is due before the
+//! one before is followed waits: that counts as its time.
 //!
 //! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
 
+mod memory;
 mod sliding;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, percentile, resident};
+use memory::resident;
+use sliding::{SCAN_NOISE, percentile};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
@@ -24,6 +27,14 @@ use touchup::sim::wavy::{RADIUS, STIFFNESS, noisy_slide_on, plate};
 const EDGES: [f64; 6] = [1.0 / 30.0, 0.1, 0.25, 0.5, 1.0, 2.0];
 /// Smallest side of a plate, m: a raster on it turns after three radii.
 const SMALLEST_SIDE: f64 = 5.0 * RADIUS;
+
+/// Median, 99 % and 99.9 % of times in ns, as text in us; sorts them.
+fn shown(times: &mut [u64]) -> String {
+    times.sort_unstable();
+    let [median, p99, p999, longest] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile(times, share));
+    format!("median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {longest:8.0}")
+}
+
 fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let side = edge * (faces as f64 / 2.0).sqrt();
     if side < SMALLEST_SIDE {
@@ -42,30 +53,36 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let engine = Engine::new(mesh, RefineParams::robust(tip), Some(params), renewal);
     let mut engine = engine.expect("the settings are in range");
     let build_ms = start.elapsed().as_secs_f64() * 1e3;
-    let (mut times, mut ages, mut moved, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
+    let (mut answers, mut followed, mut ages, mut moved) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let begun = Instant::now();
     for i in 0..seconds * 1000 {
         let sample = noisy_slide_on(side, i, 0.8 * side);
+        let mut waited = Duration::ZERO;
         if is_live {
+            let (due, now) = (Duration::from_millis(i as u64), begun.elapsed());
+            waited = now.saturating_sub(due);
             // a thread that waits busily would slow the other down where both share a core
-            std::thread::sleep(Duration::from_millis(i as u64).saturating_sub(begun.elapsed()));
+            std::thread::sleep(due.saturating_sub(now));
         }
         let start = Instant::now();
-        engine.push(&sample).expect("the sample is sound");
-        let time = start.elapsed().as_nanos() as u64;
+        engine.answer(&sample).expect("the sample is sound");
+        let answered = waited + start.elapsed();
+        engine.follow().expect("the thread of the patch goes on");
+        let done = waited + start.elapsed();
         if i > 1000 {
-            times.push(time);
+            answers.push(answered.as_nanos() as u64);
+            followed.push(done.as_nanos() as u64);
             moved += engine.refiner().moved_vertices().len();
             ages.extend(engine.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
         }
     }
-    times.sort_unstable();
     ages.sort_unstable();
-    let [median, p99, p999, longest] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile(&times, share));
     print!(
-        "edge {:6.3} mm {faces:>8} faces: begun in {build_ms:5.0} ms; push median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} \
-         max {longest:8.0}; {:6.1} vertices; {:.0} MB",
+        "edge {:6.3} mm {faces:>8} faces: begun in {build_ms:5.0} ms; answer {}; followed {}; {:6.1} vertices; {:.0} MB",
         edge * 1e3,
-        moved as f64 / times.len() as f64,
+        shown(&mut answers),
+        shown(&mut followed),
+        moved as f64 / answers.len() as f64,
         resident(),
     );
     if is_live {

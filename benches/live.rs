@@ -2,18 +2,20 @@
 //! patch has a thread of its own.
 //!
 //! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for each minute: times of
-//! [`Engine::push`], how old the touches are that the patch shows (in time of the samples), how many renewals of it
+//! [`Engine::answer`], with the wait for what followed the sample before, how old the touches are that the patch shows (in time of the samples), how many renewals of it
 //! were late, faces, and memory of the process.
 //!
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.
 
+mod memory;
 mod sliding;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use sliding::{SCAN_NOISE, percentile, resident};
+use memory::resident;
+use sliding::{SCAN_NOISE, percentile};
 use touchup::haptic::{RefineParams, TipParams};
 use touchup::live::{Engine, Gate, Pace, Renewal};
 use touchup::mesh::FaceTree;
@@ -44,10 +46,13 @@ fn main() {
         let sample = noisy_slide_on(SIDE, i, WIDTH);
         let due = Duration::from_millis(if is_fast { 0 } else { i as u64 });
         // a thread that waits busily would slow the other down where both share a core
-        std::thread::sleep(due.saturating_sub(begun.elapsed()));
+        let now = begun.elapsed();
+        std::thread::sleep(due.saturating_sub(now));
+        let waited = if is_fast { Duration::ZERO } else { now.saturating_sub(due) };
         let start = Instant::now();
-        live.push(&sample).expect("the sample is sound");
-        times.push(start.elapsed().as_nanos() as u64);
+        live.answer(&sample).expect("the sample is sound");
+        times.push((waited + start.elapsed()).as_nanos() as u64);
+        live.follow().expect("the thread of the patch goes on");
         if i > 1000 {
             ages.extend(live.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
         }
@@ -56,7 +61,7 @@ fn main() {
             ages.sort_unstable();
             let [median, p99, p999] = [0.5, 0.99, 0.999].map(|share| percentile(&times, share));
             println!(
-                "{:5.1} min: push median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {:8.0}; patch behind {:4.1} ms, \
+                "{:5.1} min: answer median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {:8.0}; patch behind {:4.1} ms, \
                  p99 {:4.1}; late {:4}; {} faces, {:.0} MB, {:.0} s",
                 (i + 1) as f64 * STEP_NS as f64 * 1e-9 / 60.0,
                 percentile(&times, 1.0),

@@ -2,17 +2,26 @@
 //! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
 //!
 //! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
-//! - `cargo bench --bench node -- dds [FACES [SECONDS]]`: sensors and viewer are another process, over DDS on the loopback
-//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute.
+//! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process each, over DDS on the loopback
+//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute. Into `FOLDER` go plots
+//!   and a table of each second.
 
+#[path = "node/course.rs"]
+mod course;
+mod memory;
 #[path = "node/peer.rs"]
 mod peer;
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use memory::resident;
+use peer::wall_ns;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
@@ -25,7 +34,7 @@ use touchup::ros::node::{INBOX, Prepared, SessionReport};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
-use touchup::sim::wavy::{slide, wavy_plate};
+use touchup::sim::wavy::{RADIUS, slide, wavy_plate};
 use touchup::stylus::Sample;
 
 /// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and again.
@@ -59,16 +68,18 @@ fn shown(Quantiles { median, p99, p999, max }: Quantiles) -> String {
 
 fn print_summary(report: &SessionReport) {
     println!(
-        "accepted {} dropped {:?} refused {:?} unrecorded {}; push {}; from arrival to mesh {}; {} view frames dropped, {} \
-         renewals late",
+        "accepted {} dropped {:?} refused {:?} unrecorded {}; work {}; from arrival to answer {}; touches shown after {}; {} view \
+         frames dropped, {} of {} renewals late",
         report.accepted,
         report.dropped,
         report.refused,
         report.unrecorded,
         shown(report.push_ns),
         shown(report.latency_ns),
+        shown(report.patch_behind_ns),
         report.dropped_view_frames,
-        report.late_renewals
+        report.late_renewals,
+        report.renewals
     );
 }
 
@@ -81,6 +92,7 @@ fn parameters(folder: &Path, faces: usize) -> Parameters {
     let mut parameters = Parameters::default();
     parameters.set("scan", &text(&scan)).expect("a path is text");
     parameters.set("session_folder", &text(folder)).expect("a path is text");
+    parameters.set("tip_radius_mm", &ParameterValue::Double(RADIUS * 1e3)).expect("a radius is a number");
     parameters
 }
 
@@ -107,11 +119,51 @@ fn alone(faces: usize) {
     print_summary(&node.join().expect("the result can be written").report);
 }
 
-/// This program again, as the other end.
-fn other(role: &str, domain: u16, seconds: usize) -> Child {
-    let program = std::env::current_exe().expect("a program knows where it is");
-    let arguments = [role.to_owned(), domain.to_string(), seconds.to_string()];
-    Command::new(program).args(arguments).spawn().expect("what runs can be started again")
+/// This program again, as another end.
+///
+/// - `out`: where it writes what it sees.
+fn other(role: &str, domain: u16, seconds: usize, out: &Path) -> Command {
+    let mut program = Command::new(std::env::current_exe().expect("a program knows where it is"));
+    program.args([role, &domain.to_string(), &seconds.to_string()]).arg(out);
+    program
+}
+
+fn started(command: &mut Command) -> Child {
+    command.spawn().expect("what runs can be started again")
+}
+
+fn check(mut child: Child) {
+    assert!(child.wait().is_ok_and(|status| status.success()), "another process failed");
+}
+
+/// What another end wrote.
+fn written<T: DeserializeOwned>(path: &Path) -> T {
+    let text = std::fs::read(path).expect("the other process wrote it");
+    serde_json::from_slice(&text).expect("it is as it is read")
+}
+
+/// A viewer: it runs until it is dropped here.
+struct Viewer {
+    child: Child,
+    said: BufReader<ChildStdout>,
+}
+
+impl Viewer {
+    /// Returns when it has the mesh.
+    fn start(domain: u16, out: &Path) -> Self {
+        let mut child = started(other("viewer", domain, 0, out).stdin(Stdio::piped()).stdout(Stdio::piped()));
+        let mut said = BufReader::new(child.stdout.take().expect("it was asked for"));
+        let mut line = String::new();
+        said.read_line(&mut line).expect("it speaks in UTF-8");
+        print!("{line}");
+        Self { child, said }
+    }
+
+    fn end(mut self) {
+        drop(self.child.stdin.take());
+        std::io::copy(&mut self.said, &mut std::io::stdout()).expect("stdout is there");
+        check(self.child);
+    }
 }
 
 fn config(domain: u16, parameters: Parameters) -> NodeConfig {
@@ -124,14 +176,13 @@ fn config(domain: u16, parameters: Parameters) -> NodeConfig {
 }
 
 /// Answers wrenches over DDS, and does nothing else.
-fn echo(domain: u16) {
+fn echo(domain: u16, folder: &Path) {
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     let port = dds::start(&config(domain, Parameters::default()), inbox.clone()).expect("the loopback interface is up");
-    let mut asking = other("echo", domain, ECHO_SECONDS);
+    let asking = started(&mut other("echo", domain, ECHO_SECONDS, &folder.join("echo.json")));
     let waiting = std::thread::spawn(move || {
-        let is_well = asking.wait().is_ok_and(|status| status.success());
+        check(asking);
         inbox.put(Arrival::Shutdown);
-        assert!(is_well, "the other process failed");
     });
     while let Some(arrival) = arrivals.recv() {
         match arrival {
@@ -145,55 +196,61 @@ fn echo(domain: u16) {
     waiting.join().expect("the other process ends well");
 }
 
-/// Memory of the process, MB.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kilobytes =
-        status.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
-    kilobytes.map_or(f64::NAN, |kilobytes: f64| kilobytes / 1e3)
-}
-
-fn over_dds(faces: usize, seconds: usize) {
+fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
     // a domain unlikely to be in use: those above 101 take ports that Linux gives away
     let domain = 1 + (std::process::id() % 100) as u16;
-    echo(domain);
     let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
+    echo(domain, folder.path());
     let parameters = parameters(folder.path(), faces);
     let (inbox, received) = inbox(INBOX, &Clock::system());
     let ready = Prepared::new(parameters.clone()).expect("the scan is sound");
     let port = dds::start(&config(domain, parameters), inbox.clone()).expect("the loopback interface is up");
     let node = ready.start(port.clone(), received, None).expect("there are threads");
-    let mut peer = other("sensors", domain, seconds);
-    let (begun, mut minute) = (Instant::now(), 0);
+    let [answers, drawn] = ["answers.json", "drawn.json"].map(|name| folder.path().join(name));
+    let viewer = Viewer::start(domain, &drawn);
+    let mut sensors = started(&mut other("sensors", domain, seconds, &answers));
+    let (begun, mut minute, mut memory) = (Instant::now(), 0, Vec::new());
     let is_well = loop {
+        memory.push((wall_ns(), resident()));
         if begun.elapsed().as_secs() >= 60 * minute {
             println!("{minute:3} min: {:.0} MB", resident());
             minute += 1;
         }
-        if let Some(status) = peer.try_wait().expect("it is ours") {
+        if let Some(status) = sensors.try_wait().expect("it is ours") {
             break status.success();
         }
         sleep(Duration::from_millis(100));
     };
-    assert!(is_well, "the other process failed");
+    assert!(is_well, "the sensors failed");
+    viewer.end();
     println!("at the end {:.0} MB", resident());
-    let joined = other("late", domain, 0).wait();
-    assert!(joined.is_ok_and(|status| status.success()), "the late joiner failed");
+    check(started(&mut other("late", domain, 0, &drawn)));
     println!("lost in transport {:?}, unsent {:?}", port.lost(), port.unsent());
     inbox.put(Arrival::Shutdown);
     print_summary(&node.join().expect("the result can be written").report);
     drop(port);
-    echo(domain);
+    if let Some(plots) = plots {
+        course::write(plots, faces, &written(&answers), &written(&drawn), &memory);
+    }
+    echo(domain, folder.path());
+}
+
+fn write(seen: &impl Serialize, path: Option<&Path>) {
+    let text = serde_json::to_vec(seen).expect("numbers have a JSON form");
+    std::fs::write(path.expect("it is told where"), text).expect("there is room in the folder");
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let numbers: Vec<usize> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
     let number = |at: usize, default: usize| numbers.get(at).copied().unwrap_or(default);
+    let path = arguments.get(3).map(Path::new);
     match arguments.first().map(String::as_str) {
-        Some("dds") => over_dds(number(0, 1_000_000), number(1, 30)),
-        Some("echo") => peer::run(number(0, 0) as u16, number(1, 0), false),
-        Some("sensors") => peer::run(number(0, 0) as u16, number(1, 0), true),
+        Some("dds") => over_dds(number(0, 1_000_000), number(1, 30), path),
+        Some(role @ ("echo" | "sensors")) => {
+            write(&peer::touch(number(0, 0) as u16, number(1, 0), role == "sensors"), path);
+        }
+        Some("viewer") => write(&peer::view(number(0, 0) as u16), path),
         Some("late") => peer::join_late(number(0, 0) as u16),
         _ if numbers.is_empty() => [100_000, 1_000_000].into_iter().for_each(alone),
         _ => numbers.into_iter().for_each(alone),

@@ -1,8 +1,9 @@
-//! The other process of the bench over DDS: it sends what sensors send, and sees what a viewer sees.
+//! The other processes of the bench over DDS: one sends what sensors send and takes the answers, one sees what a viewer sees.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::io::{Read, stdin};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -13,12 +14,15 @@ use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, P
 use touchup::live::Latencies;
 use touchup::ros::clock::stamp_ns;
 use touchup::ros::messages::{
-    HapticMismatch, Header, Marker, MeshPatch, Point, PoseStamped, RosMessage, WrenchStamped,
+    DiagnosticArray, HapticMismatch, Marker, MeshPatch, Point, PoseStamped, RosMessage, WrenchStamped,
 };
 use touchup::sim::wavy::{STEP_NS, slide};
 
+use crate::course::{Answers, Drawn, SecondDrawn, Times};
 use crate::{WIDTH, messages, shown};
 
+/// ns
+const SECOND_NS: i64 = 1_000_000_000;
 /// All tiles are there when none has come for so long.
 const QUIET: Duration = Duration::from_secs(1);
 /// Time limit for discovery of the other end.
@@ -34,13 +38,8 @@ const MESH: QosProfile = QosProfile::subscription_default()
 
 const CHANGES: QosProfile = SAMPLES.reliability_reliable(WhenFull::Wait(Duration::from_millis(100)));
 
-/// Time of this process, ns.
-fn steady_ns() -> i64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_nanos() as i64
-}
-
-fn wall_ns() -> i64 {
+/// Time of all processes, ns since 1970.
+pub fn wall_ns() -> i64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
 }
 
@@ -140,48 +139,35 @@ pub fn join_late(domain: u16) {
     println!("a late joiner has {} tiles after {took:.1} s", tiles.seen.len());
 }
 
-/// Answers of the node.
+/// What the viewer sees.
+#[derive(Default)]
 struct Viewer {
-    sent_ns: Arc<Vec<AtomicI64>>,
-    begin_ns: i64,
-    answered: u64,
-    round_trips: Latencies,
-    /// when a vertex was first drawn here, ns
+    /// when a vertex was first drawn here, ns since 1970
     drawn: HashMap<VertexBits, i64>,
     /// vertices reported at a place and not yet drawn there
     pending: HashMap<VertexBits, u32>,
-    /// of each of these vertices the samples that moved it, and where to, in their order
-    moves: HashMap<u32, Vec<(usize, VertexBits)>>,
+    /// of each of these vertices the stamps of the samples that moved it, ns, and where to, in their order
+    moves: HashMap<u32, Vec<(i64, VertexBits)>>,
     visible: Latencies,
+    /// the same by the second of the stamp
+    seconds: BTreeMap<i64, Latencies>,
+    /// what the node says of each second: age of what the patch shows, renewals, and those that were late
+    shown: BTreeMap<i64, (Times, [u64; 2])>,
 }
 
 impl Viewer {
-    fn sent(&self, number: usize) -> i64 {
-        self.sent_ns.get(number).map_or(0, |sent| sent.load(Ordering::Relaxed))
-    }
-
-    fn number(&self, header: &Header) -> Option<usize> {
-        usize::try_from((stamp_ns(header.stamp) - self.begin_ns) / STEP_NS).ok()
-    }
-
-    fn answer(&mut self, mismatch: &HapticMismatch) {
-        let Some(number) = self.number(&mismatch.header) else { return };
-        self.answered += 1;
-        self.round_trips.record(Duration::from_nanos((steady_ns() - self.sent(number)).max(0) as u64));
-    }
-
     /// Vertices were moved; an earlier tile may show the new position.
     fn note(&mut self, patch: &MeshPatch) {
-        let Some(number) = self.number(&patch.header) else { return };
+        let moved_ns = stamp_ns(patch.header.stamp);
         for (&vertex, position) in patch.vertices.iter().zip(patch.positions.chunks_exact(3)) {
             let place = [0, 1, 2].map(|axis| position[axis].to_bits());
             match self.drawn.get(&place) {
                 // it went back to where it was before: the drawing does not show when
-                Some(&at_ns) if at_ns < self.sent(number) => self.forget(vertex),
-                Some(&at_ns) => self.record(number, at_ns),
+                Some(&at_ns) if at_ns < moved_ns => self.forget(vertex),
+                Some(&at_ns) => self.record(moved_ns, at_ns),
                 None => {
                     self.pending.insert(place, vertex);
-                    self.moves.entry(vertex).or_default().push((number, place));
+                    self.moves.entry(vertex).or_default().push((moved_ns, place));
                 }
             }
         }
@@ -202,9 +188,9 @@ impl Viewer {
             let moves = self.moves.remove(&vertex).unwrap_or_default();
             let until = moves.iter().rposition(|&(_, to)| to == place).map_or(0, |last| last + 1);
             let (shown, open) = moves.split_at(until);
-            for &(number, to) in shown {
+            for &(moved_ns, to) in shown {
                 self.pending.remove(&to);
-                self.record(number, at_ns);
+                self.record(moved_ns, at_ns);
             }
             if !open.is_empty() {
                 self.moves.insert(vertex, open.to_vec());
@@ -212,99 +198,142 @@ impl Viewer {
         }
     }
 
-    fn record(&mut self, number: usize, at_ns: i64) {
-        self.visible.record(Duration::from_nanos((at_ns - self.sent(number)).max(0) as u64));
+    fn record(&mut self, moved_ns: i64, at_ns: i64) {
+        let took = Duration::from_nanos((at_ns - moved_ns).max(0) as u64);
+        self.visible.record(took);
+        self.seconds.entry(moved_ns / SECOND_NS).or_default().record(took);
+    }
+
+    /// What the node says of the second that ends.
+    fn note_diagnostics(&mut self, message: &DiagnosticArray) {
+        let values = message.status.iter().flat_map(|status| &status.values);
+        let values: HashMap<&str, f64> =
+            values.filter_map(|pair| Some((pair.key.as_str(), pair.value.parse().ok()?))).collect();
+        let number = |name: &str| values.get(name).copied();
+        let shown = || {
+            let [median, p99, longest] = ["p50", "p99", "max"].map(|which| number(&format!("patch_behind_{which}_ms")));
+            let times = Times { median: median?, p99: p99?, longest: longest? };
+            Some((times, [number("renewals")? as u64, number("late_renewals")? as u64]))
+        };
+        // before anything was touched nothing is shown
+        if let Some(shown) = shown().filter(|(times, _)| times.longest > 0.0) {
+            self.shown.insert(wall_ns() / SECOND_NS, shown);
+        }
+    }
+
+    /// What was seen, by the second.
+    fn seen(&self) -> Drawn {
+        let at = |second: &i64| SecondDrawn {
+            drawn: self.seconds.get(second).and_then(Times::of),
+            shown: self.shown.get(second).copied(),
+        };
+        let seconds = self.seconds.keys().chain(self.shown.keys());
+        Drawn { seconds: seconds.map(|second| (*second, at(second))).collect() }
     }
 }
 
-/// Sends wrenches at 1 kHz, and poses and looks at tiles where the other end is the node; measures how long answers take.
-pub fn run(domain: u16, seconds: usize, is_node: bool) {
+/// Looks at the mesh until stdin ends; the first line on stdout says that all of it is here.
+pub fn view(domain: u16) -> Drawn {
+    let (context, mut node) = joined(domain, "viewer");
+    let mut mesh = reader::<Marker>(&mut node, "/mesh", MESH);
+    let changes = reader::<MeshPatch>(&mut node, "/mesh_patch", CHANGES);
+    let diagnostics = reader::<DiagnosticArray>(&mut node, "/diagnostics", CHANGES);
+    let (begun, mut tiles) = (Instant::now(), Tiles::default());
+    wait_for_matches(&context, 3);
+    while !tiles.is_quiet() && begun.elapsed() < PATIENCE {
+        tiles.take(&mut mesh);
+        sleep(Duration::from_millis(1));
+    }
+    let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
+    let drawn = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
+    let mut seen = Viewer { drawn, ..Viewer::default() };
+    println!("the viewer has {} tiles after {took:.1} s", tiles.seen.len());
+    let has_ended = Arc::new(AtomicBool::new(false));
+    spawn({
+        let has_ended = Arc::clone(&has_ended);
+        move || {
+            // nothing is ever written to it
+            let _ = stdin().read(&mut [0]);
+            has_ended.store(true, Ordering::Relaxed);
+        }
+    });
+    let mut poll = Poll::new().expect("the system polls");
+    poll.registry().register(&mut mesh, Token(0), Interest::READABLE).expect("it can be polled");
+    let mut events = Events::with_capacity(8);
+    while !has_ended.load(Ordering::Relaxed) {
+        // an interrupted wait is one that is over
+        let _ = poll.poll(&mut events, Some(Duration::from_millis(100)));
+        while let Ok(Some((patch, _))) = changes.take() {
+            seen.note(&patch);
+        }
+        while let Ok(Some((message, _))) = diagnostics.take() {
+            seen.note_diagnostics(&message);
+        }
+        let (came, now) = (tiles.take(&mut mesh), wall_ns());
+        came.iter().for_each(|tile| seen.look(&tiles.seen[tile], now));
+    }
+    let unseen: usize = seen.moves.values().map(Vec::len).sum();
+    println!(
+        "from a sample that moves a vertex to where the viewer has it {}, {unseen} never; {} tiles, {} received",
+        shown(seen.visible.quantiles()),
+        tiles.seen.len(),
+        tiles.received
+    );
+    seen.seen()
+}
+
+/// Sends wrenches at 1 kHz, and poses where the other end is the node, from a whole second on; measures how long answers take.
+pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
     let (context, mut node) = joined(domain, "sensors");
     let mut mismatches = reader::<HapticMismatch>(&mut node, "/mismatch", SAMPLES);
     let wrenches = writer::<WrenchStamped>(&mut node, "/stylus/wrench");
     let poses = is_node.then(|| writer::<PoseStamped>(&mut node, "/stylus/pose"));
-    let mut mesh = is_node.then(|| reader::<Marker>(&mut node, "/mesh", MESH));
-    let mut changes = is_node.then(|| reader::<MeshPatch>(&mut node, "/mesh_patch", CHANGES));
-    let (begun, mut tiles) = (Instant::now(), Tiles::default());
-    wait_for_matches(&context, 2 + 3 * usize::from(is_node));
-    if let Some(mesh) = &mut mesh {
-        while !tiles.is_quiet() && begun.elapsed() < PATIENCE {
-            tiles.take(mesh);
-            sleep(Duration::from_millis(1));
-        }
-        let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
-        println!("the viewer has {} tiles after {took:.1} s", tiles.seen.len());
-    }
-    let drawn: HashMap<VertexBits, i64> = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
+    wait_for_matches(&context, 2 + usize::from(is_node));
     let count = seconds * 1000;
     let sent_ns: Arc<Vec<AtomicI64>> = Arc::new((0..count).map(|_| AtomicI64::new(0)).collect());
-    let (begin, begin_ns) = (Instant::now(), wall_ns());
+    let begin_ns = (wall_ns() / SECOND_NS + 1) * SECOND_NS;
+    let begin = Instant::now() + Duration::from_nanos((begin_ns - wall_ns()).max(0) as u64);
     let sending = spawn({
         let sent_ns = Arc::clone(&sent_ns);
         move || {
             for (number, sent) in sent_ns.iter().enumerate() {
-                sleep(Duration::from_millis(number as u64).saturating_sub(begin.elapsed()));
+                sleep((begin + Duration::from_millis(number as u64)).saturating_duration_since(Instant::now()));
                 let mut sample = slide(number, WIDTH);
                 sample.stamp_ns += begin_ns;
                 let (wrench, pose) = messages(&sample);
                 if let Some(poses) = &poses {
                     wrenches.publish(wrench).expect("best effort never waits");
-                    sent.store(steady_ns(), Ordering::Relaxed);
+                    sent.store(wall_ns(), Ordering::Relaxed);
                     poses.publish(pose).expect("best effort never waits");
                 } else {
-                    sent.store(steady_ns(), Ordering::Relaxed);
+                    sent.store(wall_ns(), Ordering::Relaxed);
                     wrenches.publish(wrench).expect("best effort never waits");
                 }
             }
         }
     });
-    let mut seen = Viewer {
-        sent_ns,
-        begin_ns,
-        answered: 0,
-        round_trips: Latencies::new(),
-        drawn,
-        pending: HashMap::new(),
-        moves: HashMap::new(),
-        visible: Latencies::new(),
-    };
+    let mut round_trips = Latencies::new();
+    let mut by_second: Vec<(u64, Latencies)> = (0..seconds).map(|_| (0, Latencies::new())).collect();
     let mut poll = Poll::new().expect("the system polls");
-    let registry = poll.registry();
-    registry.register(&mut mismatches, Token(0), Interest::READABLE).expect("it can be polled");
-    if let Some(mesh) = &mut mesh {
-        registry.register(mesh, Token(1), Interest::READABLE).expect("it can be polled");
-    }
+    poll.registry().register(&mut mismatches, Token(0), Interest::READABLE).expect("it can be polled");
     let mut events = Events::with_capacity(8);
     let end = begin + Duration::from_secs(seconds as u64) + REST;
     while Instant::now() < end {
         // an interrupted wait is one that is over
         let _ = poll.poll(&mut events, Some(Duration::from_millis(100)));
         while let Ok(Some((mismatch, _))) = mismatches.take() {
-            seen.answer(&mismatch);
-        }
-        if let Some(changes) = &mut changes {
-            while let Ok(Some((patch, _))) = changes.take() {
-                seen.note(&patch);
-            }
-        }
-        if let Some(mesh) = &mut mesh {
-            let (came, now) = (tiles.take(mesh), steady_ns());
-            came.iter().for_each(|tile| seen.look(&tiles.seen[tile], now));
+            let number = usize::try_from((stamp_ns(mismatch.header.stamp) - begin_ns) / STEP_NS).ok();
+            let Some((number, sent)) = number.and_then(|number| Some((number, sent_ns.get(number)?))) else { continue };
+            let took = Duration::from_nanos((wall_ns() - sent.load(Ordering::Relaxed)).max(0) as u64);
+            let (answered, times) = &mut by_second[number / 1000];
+            *answered += 1;
+            times.record(took);
+            round_trips.record(took);
         }
     }
     sending.join().expect("it sends to the end");
-    println!(
-        "{} of {count} answered; from the sensors and back {}",
-        seen.answered,
-        shown(seen.round_trips.quantiles())
-    );
-    if mesh.is_some() {
-        let unseen: usize = seen.moves.values().map(Vec::len).sum();
-        println!(
-            "from a sample that moves a vertex to where the viewer has it {}, {unseen} never; {} tiles, {} received",
-            shown(seen.visible.quantiles()),
-            tiles.seen.len(),
-            tiles.received
-        );
-    }
+    let answered: u64 = by_second.iter().map(|(answered, _)| answered).sum();
+    println!("{answered} of {count} answered; from the sensors and back {}", shown(round_trips.quantiles()));
+    let seconds = by_second.iter().map(|(answered, times)| (1000_u64.saturating_sub(*answered), Times::of(times)));
+    Answers { begin_ns, seconds: seconds.collect() }
 }

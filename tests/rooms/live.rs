@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use touchup::haptic::{RefineParams, Refiner, TipParams};
+use touchup::haptic::{RefineParams, Refiner, TipParams, Update};
 use touchup::live::{Engine, Gate, GateKeeper, LiveCounts, Pace, Renewal};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::reconstruct::{PatchDelta, Patcher, PatcherParams, Splice};
@@ -15,7 +15,7 @@ use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
 
 /// Parts of the patch that are taken up at one sample.
-const AT_ONCE: usize = 40;
+const AT_ONCE: usize = 80;
 /// The same on every machine.
 const PATIENT: Pace = Pace { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: true };
 /// Time between renewals, ns.
@@ -189,15 +189,17 @@ fn by_lattice(scan: &TriMesh, tree: &FaceTree, patcher: &Patcher) -> TriMesh {
     mesh
 }
 
-/// The same by hand, on one thread.
-fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
+/// The same by hand, on one thread, with nothing looked up ahead: the mesh after the last sample and at the end, and the answer to
+/// each sample.
+fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<Update>) {
     let tree = FaceTree::new(&stream.scan);
     let (mut patcher, mut refiner) = (patcher(stream), refiner(&stream.scan));
     refiner.expect_patch(0).unwrap();
     let mut due: VecDeque<(i64, PatchDelta)> = VecDeque::new();
     let (mut slot, mut at_hand) = (None, None::<PatchDelta>);
+    let mut answers = Vec::new();
     for sample in &stream.samples {
-        refiner.push(sample).unwrap();
+        answers.push(refiner.push(sample).unwrap());
         let here = sample.stamp_ns.div_euclid(pace.every_ns);
         if slot.replace(here).is_some_and(|before| here > before) {
             due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
@@ -223,7 +225,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> (TriMesh, TriMesh) {
     for _ in 0..2 {
         follow(&patcher.renewed(&stream.scan, &tree));
     }
-    (touching, refiner.into_mesh())
+    ([touching, refiner.into_mesh()], answers)
 }
 
 fn assert_same(a: &TriMesh, b: &TriMesh) {
@@ -235,9 +237,16 @@ fn assert_same(a: &TriMesh, b: &TriMesh) {
 fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
     let stream = stream(2, 0.1);
     let pace = PATIENT;
-    let (touching, at_the_end) = one_after_the_other(&stream, pace);
+    let ([touching, at_the_end], answers) = one_after_the_other(&stream, pace);
     let mut live = engine(&stream, pace, Gate::default());
-    stream.samples.iter().for_each(|sample| assert!(live.push(sample).is_ok()));
+    for (i, (sample, answer)) in stream.samples.iter().zip(&answers).enumerate() {
+        assert_eq!(live.answer(sample).unwrap(), *answer, "sample {i}");
+        // what is not followed at once is followed before the next answer
+        if i % 7 != 0 {
+            live.follow().unwrap();
+        }
+    }
+    live.follow().unwrap();
     assert_same(live.refiner().mesh(), &touching);
     let moved = |mesh: &TriMesh| {
         (0..stream.scan.vertex_slots() as u32)

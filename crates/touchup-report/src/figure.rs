@@ -97,6 +97,8 @@ pub enum LineStroke {
     Joined,
     /// marks alone
     Marks,
+    /// a line without marks: a course of many values
+    Course,
     /// a thin dashed line without marks: a model, a limit
     Dashed,
 }

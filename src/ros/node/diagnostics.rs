@@ -11,7 +11,7 @@ use super::convert::header;
 use super::error::NodeError;
 use super::refinement::RefinementWorker;
 use super::session::{NodeEnd, SessionReport};
-use crate::live::Quantiles;
+use crate::live::{Latencies, Quantiles};
 use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::port::Endpoint;
 use crate::session::Unrecorded;
@@ -151,9 +151,10 @@ impl RefinementWorker {
             hardware_id: format!("{} of {}", self.setup.source, self.port.node_name()),
             values,
         };
+        let numbers = self.numbers(&report);
+        self.session.behind_lately = Latencies::new();
         let how = "how poses and wrenches come, and what was refused".to_owned();
-        let status =
-            vec![status("session", words, self.numbers(&report)), status("streams", how, self.stream_numbers(&report))];
+        let status = vec![status("session", words, numbers), status("streams", how, self.stream_numbers(&report))];
         let message = DiagnosticArray { header: header(self.port.now_ns(), ""), status };
         self.setup.shared.offer(&self.view, ViewInput::Diagnostics(Box::new(message)));
     }
@@ -172,7 +173,13 @@ impl RefinementWorker {
             let quantiles = [("p50", median), ("p99", p99), ("max", max)];
             values.extend(quantiles.map(|(which, ns)| value(&format!("{name}_{which}_us"), us(ns))));
         }
+        let Quantiles { median, p99, max, .. } = self.session.behind_lately.quantiles();
+        let behind = [("p50", median), ("p99", p99), ("max", max)];
+        values.extend(
+            behind.map(|(which, ns)| value(&format!("patch_behind_{which}_ms"), format!("{:.1}", ns as f64 * 1e-6))),
+        );
         values.extend([
+            value("renewals", report.renewals),
             value("late_renewals", report.late_renewals),
             value("tiles_waiting", shared.tiles_waiting.load(Ordering::Relaxed)),
             value("versions_behind", self.session.version.saturating_sub(shared.mesh.version())),

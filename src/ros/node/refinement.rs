@@ -308,19 +308,18 @@ impl RefinementWorker {
         }
     }
 
-    /// Moves the mesh, then sends what changed to the others.
+    /// Moves the mesh and says what was found, then follows the patch and sends what changed to the others.
     ///
     /// - `at`: when the message came that completed the sample, where one did.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
-        let pushing = self.setup.clock.now();
-        let pushed = self.session.engine.push(sample);
-        let pushed_at = self.setup.clock.now();
-        self.session.pushes.record(pushed_at.saturating_duration_since(pushing));
+        let begun = self.setup.clock.now();
+        let answer = self.session.engine.answer(sample);
+        let answered = self.setup.clock.now();
         if let Some(at) = at {
-            self.session.latencies.record(pushed_at.saturating_duration_since(at));
+            self.session.latencies.record(answered.saturating_duration_since(at));
         }
-        self.sampled = pushing;
-        match pushed {
+        self.sampled = begun;
+        match answer {
             Ok(update) => {
                 self.session.counters.accepted += 1;
                 self.session.last_ns = Some(sample.stamp_ns);
@@ -329,11 +328,26 @@ impl RefinementWorker {
                     self.session.input.contact(contact);
                 }
                 self.publish_mismatch(&update);
-                self.note_changes();
+                let following = self.setup.clock.now();
+                let followed = self.session.engine.follow();
+                let work = answered.saturating_duration_since(begun) + self.setup.clock.since(following);
+                self.session.pushes.record(work);
+                self.note_patch_behind(sample.stamp_ns);
+                match followed {
+                    Ok(()) => self.note_changes(),
+                    Err(error) => self.fail(&error),
+                }
             }
             Err(LiveError::Refine(error)) => self.session.counters.refuse(reason_of(&error)),
             Err(error) => self.fail(&error),
         }
+    }
+
+    fn note_patch_behind(&mut self, stamp_ns: i64) {
+        let Some(until_ns) = self.session.engine.patched_until_ns() else { return };
+        let behind = Duration::from_nanos(stamp_ns.saturating_sub(until_ns).max(0) as u64);
+        self.session.behind.record(behind);
+        self.session.behind_lately.record(behind);
     }
 
     pub(super) fn fail(&mut self, error: &LiveError) {

@@ -61,10 +61,14 @@ pub struct NodeSession {
     pub epoch: Epoch,
     /// what was refused
     pub counters: Counters,
-    /// of one sample through the haptic update
+    /// work for one sample: answer, and what follows it
     pub pushes: Latencies,
     /// from the arrival of what completed a sample to the mesh
     pub latencies: Latencies,
+    /// age of the touches that the mesh shows, at each sample …
+    pub behind: Latencies,
+    /// … and since the last diagnostics
+    pub behind_lately: Latencies,
     /// state of the mesh, as in `MeshPatch`
     pub version: u64,
     /// … and edits at that time
@@ -104,11 +108,15 @@ pub struct SessionReport {
     pub contacts: u64,
     /// updates made smaller because a face would have folded
     pub cut_back: u64,
-    /// of one sample through the haptic update, ns
+    /// work for one sample: its answer, and following the patch before the next one, ns
     pub push_ns: Quantiles,
     /// from the arrival of what completed a sample to the mesh, ns
     pub latency_ns: Quantiles,
-    /// renewals of the patch that were not done when they were due: the mesh showed a touch later
+    /// age of the touches that the patch in the mesh shows, at each sample, ns
+    pub patch_behind_ns: Quantiles,
+    /// renewals of the patch
+    pub renewals: u64,
+    /// … that were not done when they were due: the mesh showed a touch later
     pub late_renewals: u64,
     /// what was written
     pub result: Option<Outcome>,
@@ -150,6 +158,8 @@ impl NodeSession {
             counters: Counters::default(),
             pushes: Latencies::new(),
             latencies: Latencies::new(),
+            behind: Latencies::new(),
+            behind_lately: Latencies::new(),
             version: 1,
             edits: 0,
             last_ns: None,
@@ -228,6 +238,8 @@ impl NodeSession {
             cut_back: counts.cut_back,
             push_ns: self.pushes.quantiles(),
             latency_ns: self.latencies.quantiles(),
+            patch_behind_ns: self.behind.quantiles(),
+            renewals: engine.counts().renewals,
             late_renewals: engine.counts().late,
             result: None,
         }

@@ -30,7 +30,7 @@ impl Refiner {
         let Some(carve) = self.params.carve else { return update };
         // a mesh that the tip does not enter by more than the tolerance is left alone
         let (tolerance, hint) = if state == TouchState::Contact {
-            (carve.contact_tolerance.max(carve.tolerance), self.contact_region.roi.handle)
+            (carve.contact_tolerance.max(carve.tolerance), self.nearest)
         } else {
             (carve.tolerance, self.carve_region.roi.handle)
         };

@@ -73,6 +73,8 @@ pub(super) struct HandleRegion {
     size: RoiSize,
     refit: RefitPlan,
     seen: Option<u64>,
+    /// whether the motion that needs no look was bounded since the region was refreshed
+    is_bounded: bool,
 }
 
 impl DeformableMesh {
@@ -133,16 +135,40 @@ impl DeformableMesh {
         let vertices = size.room(self.mean_edge);
         self.displacements.reserve(vertices);
         self.before.reserve(vertices);
-        HandleRegion { roi: Roi::with_room(vertices), size, refit: RefitPlan::with_room(3 * vertices), seen: None }
+        HandleRegion {
+            roi: Roi::with_room(vertices),
+            size,
+            refit: RefitPlan::with_room(3 * vertices),
+            seen: None,
+            is_bounded: false,
+        }
     }
 
-    /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
-    pub fn deform(&mut self, region: &mut HandleRegion, handle: FaceId, steps: &[Vector3<f64>; 3]) -> RegionFit {
+    /// Makes the region that of `handle`, and looks at it again where the mesh was changed elsewhere.
+    pub fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
         if region.roi.handle != Some(handle) {
             region.roi.rebuild(&self.mesh, handle, region.size, self.guard.is_some());
             self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }
+        if region.seen != Some(self.edits) {
+            if let Some(guard) = &self.guard {
+                let (margin, gap) = (MARGIN_EDGES * self.mean_edge, self.evidence(guard).gap);
+                region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, gap);
+            }
+            region.refit.spend();
+            (region.seen, region.is_bounded) = (Some(self.edits), false);
+        }
+    }
+
+    /// Whether a region is that of `handle` in the mesh as it is.
+    pub fn is_prepared(&self, region: &HandleRegion, handle: FaceId) -> bool {
+        region.roi.handle == Some(handle) && region.seen == Some(self.edits)
+    }
+
+    /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
+    pub fn deform(&mut self, region: &mut HandleRegion, handle: FaceId, steps: &[Vector3<f64>; 3]) -> RegionFit {
+        self.prepare(region, handle);
         if let Some(strokes) = &mut self.strokes {
             strokes.note_positions(&region.roi.vertices, &self.mesh);
         }
@@ -154,9 +180,6 @@ impl DeformableMesh {
                 RegionFit::Whole
             }
         };
-        if region.seen != Some(self.edits) {
-            region.refit.spend();
-        }
         self.tree.refit_planned(&self.mesh, &mut region.refit, longest, BOX_MARGIN_EDGES * self.mean_edge);
         self.edits += 1;
         region.seen = Some(self.edits);
@@ -259,8 +282,8 @@ impl DeformableMesh {
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
     fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> RegionFit {
         let margin = MARGIN_EDGES * self.mean_edge;
-        if region.seen != Some(self.edits) {
-            region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, &self.evidence(guard));
+        if !std::mem::replace(&mut region.is_bounded, true) {
+            region.roi.neighbourhood.bound_unseen(&self.mesh, &self.evidence(guard));
         } else if region.roi.neighbourhood.is_outdated(longest) {
             region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
         }

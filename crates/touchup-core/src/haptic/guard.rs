@@ -151,12 +151,21 @@ impl Neighbourhood {
         self.reached.reserve(4 * faces);
     }
 
-    /// Collects the region again after the mesh was changed elsewhere; arguments as in [`Self::judge`].
-    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, evidence: &GuardEvidence) {
+    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen then, before [`Self::bound_unseen`].
+    ///
+    /// - `gap`: as in [`GuardEvidence`].
+    pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.before.clear();
         self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
+        if self.smooth.is_none() {
+            self.suspects.measure(mesh, gap);
+        }
         self.unseen = 0.0;
+    }
+
+    /// Finds how far the vertices of a refreshed region may move unseen; `evidence` as in [`Self::judge`].
+    pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
             self.after.clear();
             self.after.extend_from_slice(&self.before[..self.ring.moving]);

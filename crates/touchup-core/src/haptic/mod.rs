@@ -162,7 +162,13 @@ pub struct Refiner {
     dynamics: FaceDynamics,
     deformable: DeformableMesh,
     contact_region: HandleRegion,
+    /// of the face that the tip is likely to touch next
+    next_region: HandleRegion,
     carve_region: HandleRegion,
+    /// the face that was found last at the point that touches
+    nearest: Option<FaceId>,
+    /// where the tip touches; `None` without contact, and where the point depends on the face
+    track: Option<TouchTrack>,
     /// leaves around the point of the tip that touches …
     near_contact: Nearby,
     /// … and around its middle
@@ -177,6 +183,14 @@ pub struct Refiner {
     /// the handle and n*(0), its normal when it became the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
     counts: RefineCounts,
+}
+
+/// Where the tip touches from sample to sample, m, in O.
+#[derive(Clone, Copy, Debug)]
+struct TouchTrack {
+    last: Point3<f64>,
+    /// where it comes to if it goes on as it did
+    next: Point3<f64>,
 }
 
 /// The ball against the face it touches.
@@ -209,7 +223,10 @@ impl Refiner {
             contacts: ContactEstimator::new(params.contact())?,
             dynamics: FaceDynamics::new(params.dynamics)?,
             contact_region: deformable.region(params.roi),
+            next_region: deformable.region(params.roi),
             carve_region: deformable.region(RoiSize::Handle),
+            nearest: None,
+            track: None,
             near_contact: Nearby::default(),
             near_tip: Nearby::default(),
             deformable,
@@ -255,6 +272,7 @@ impl Refiner {
         self.counts.contacts = self.contacts.contacts();
         // a sample outside the region that may be touched moves nothing
         let is_outside = self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre));
+        let track = self.track.take();
         let update = match ball_contact {
             None => {
                 self.begun = None;
@@ -267,7 +285,7 @@ impl Refiner {
             }
             Some(_) => {
                 self.deformable.touch();
-                match self.pressing(&ball, surface, handle) {
+                match self.pressing(&ball, surface, handle, track) {
                     Some(pressing) => self.press(&pressing, dt)?,
                     None => {
                         self.counts.out_of_reach += 1;
@@ -308,25 +326,34 @@ impl Refiner {
         }
         self.deformable.note_normal(pressing.handle, &pressing.normal);
         let steps = self.rigid_steps(pressing, &next);
+        self.take_region(pressing.handle);
         let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, &steps);
         self.count(fit);
         Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
-    fn pressing(&mut self, ball: &Ball, surface: Option<NormalEstimate>, handle: Option<FaceId>) -> Option<Pressing> {
-        let normal = surface.map(|known| known.normal).unwrap_or_default();
-        let reach = self.deformable.largest_move + self.params.tip.radius;
+    fn pressing(
+        &mut self,
+        ball: &Ball,
+        surface: Option<NormalEstimate>,
+        handle: Option<FaceId>,
+        track: Option<TouchTrack>,
+    ) -> Option<Pressing> {
+        let (normal, reach) = (surface.map(|known| known.normal).unwrap_or_default(), self.reach());
         // the spring expects the deflection F/k of the tip, a rigid contact does not
         let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
         let seek = match self.params.touch_point {
             TouchPoint::MeasuredNormal => self.touching_point(centre, &normal),
             TouchPoint::FaceNormal => centre,
         };
-        let last = self.contact_region.roi.handle;
         let hit = match self.params.touch_point {
             _ if handle.is_some() => None,
-            TouchPoint::MeasuredNormal => self.deformable.closest(&seek, last, reach, &mut self.near_contact),
+            TouchPoint::MeasuredNormal => {
+                let step = track.map_or_else(Vector3::zeros, |track| seek - track.last);
+                self.track = Some(TouchTrack { last: seek, next: seek + step });
+                self.touched_face(&seek)
+            }
             TouchPoint::FaceNormal => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
         };
         let handle = handle.or(hit.map(|hit| hit.face))?;
@@ -341,6 +368,43 @@ impl Refiner {
                 Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
             }
         })
+    }
+
+    /// Faces farther from the point that touches are out of reach, m.
+    fn reach(&self) -> f64 {
+        self.deformable.largest_move + self.params.tip.radius
+    }
+
+    /// The face closest to the point that touches.
+    fn touched_face(&mut self, point: &Point3<f64>) -> Option<FaceHit> {
+        let hit = self.deformable.closest(point, self.nearest, self.reach(), &mut self.near_contact);
+        self.nearest = hit.map(|hit| hit.face).or(self.nearest);
+        hit
+    }
+
+    /// The region of the contact becomes the one that was made ready for this handle, if there is one.
+    fn take_region(&mut self, handle: FaceId) {
+        if self.contact_region.roi.handle != Some(handle) && self.deformable.is_prepared(&self.next_region, handle) {
+            std::mem::swap(&mut self.contact_region, &mut self.next_region);
+            self.next_region.roi.handle = None;
+        }
+    }
+
+    /// Makes ready what the next sample needs if the tip goes on as it did, so that this does not wait for it: the closest face, and
+    /// the region around it. To be called between samples; it changes no result.
+    pub fn look_ahead(&mut self) {
+        let Some(TouchTrack { next, .. }) = self.track else { return };
+        let Some(FaceHit { face, .. }) = self.touched_face(&next) else { return };
+        if self.deformable.is_stiff(face) {
+            return;
+        }
+        if self.contact_region.roi.handle == Some(face) {
+            self.deformable.prepare(&mut self.contact_region, face);
+        } else if !self.deformable.is_prepared(&self.next_region, face) {
+            // what lies within a region depends on when it is made
+            self.next_region.roi.handle = None;
+            self.deformable.prepare(&mut self.next_region, face);
+        }
     }
 
     /// The point of the tip that touches a surface of this outward normal, m, in O.
@@ -451,8 +515,10 @@ impl Refiner {
 
     /// Faces were added, removed or moved.
     fn forget_regions(&mut self) {
-        self.contact_region.roi.handle = None;
-        self.carve_region.roi.handle = None;
+        for region in [&mut self.contact_region, &mut self.next_region, &mut self.carve_region] {
+            region.roi.handle = None;
+        }
+        self.nearest = None;
         self.begun = None;
     }
 

@@ -47,22 +47,24 @@ pub(crate) fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn
     parts.into_iter().flatten().collect()
 }
 
+/// For tests: as if so many pieces were done at the same time, the last one first.
+#[cfg(test)]
+pub(in crate::mesh) struct Backwards(pub usize);
+
+#[cfg(test)]
+impl Workers for Backwards {
+    fn count(&self) -> usize {
+        self.0
+    }
+
+    fn run(&self, jobs: Vec<Job<'_>>) {
+        jobs.into_iter().rev().for_each(|job| job());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The last piece first.
-    struct Backwards(usize);
-
-    impl Workers for Backwards {
-        fn count(&self) -> usize {
-            self.0
-        }
-
-        fn run(&self, jobs: Vec<Job<'_>>) {
-            jobs.into_iter().rev().for_each(|job| job());
-        }
-    }
 
     #[test]
     fn every_item_comes_once_and_in_order_whoever_does_it() {

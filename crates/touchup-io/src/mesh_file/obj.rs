@@ -33,11 +33,15 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 
 /// The triangles as [`read`] has them, and how they look; what materials say is read from `folder`.
 ///
-/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates.
+/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates. A file with neither colours nor texture
+/// coordinates is not parsed: nothing comes of it.
 pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
     let bytes = as_utf8(bytes)?;
     let mut lines = Lines::new(&bytes, true);
     lines.has_colours = every_vertex_has_a_colour(&bytes);
+    if !lines.has_colours && !has_texture_coordinates(&bytes) {
+        return Ok(PaintedSoup::default());
+    }
     // a file of materials that is not there, or damaged, names no image
     let materials = |name: &Path| {
         let file = File::open(folder.join(name)).map_err(|_| LoadError::OpenFileFailed)?;
@@ -167,6 +171,10 @@ fn every_vertex_has_a_colour(bytes: &[u8]) -> bool {
     vertices.all(|line| line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count() == 7)
 }
 
+fn has_texture_coordinates(bytes: &[u8]) -> bool {
+    bytes.split(|&b| b == b'\n').any(|line| matches!(line.trim_ascii_start(), [b'v', b't', b' ' | b'\t', ..]))
+}
+
 /// The line up to the third coordinate when more than a weight follows: files in which only some vertices have a colour
 /// would be refused.
 fn without_colour(line: &[u8]) -> &[u8] {
@@ -293,4 +301,19 @@ fn material(shown: u32) -> String {
 
 fn named(vertex: u32) -> u64 {
     u64::from(vertex) + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_does_not_say_how_it_looks_is_not_parsed_for_that() {
+        let read = |text: String| read_painted(text.as_bytes(), 1.0, Path::new(""));
+        let plain = |colour: &str| format!("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0{colour}\nusemtl x\nf 1 2 nothing\n");
+        let soup = read(plain("")).expect("its faces are not looked at");
+        assert!(soup.faces.is_empty() && soup.colours.is_none() && soup.texture.is_none());
+        assert!(read(format!("  vt 0 0\n{}", plain(""))).is_err(), "its faces may have texture coordinates");
+        assert!(read(plain(" 0 0 1").replacen("v 0 0 0", "v 0 0 0 0 0 0", 1)).is_err(), "its vertices have colours");
+    }
 }

@@ -50,13 +50,13 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, series: &[Series], looks: &Lo
 fn draw_series(svg: &mut Svg, frame: &Frame, extents: [&Extent; 2], look: Look, series: &Series) -> usize {
     let places: Vec<Option<[f64; 2]>> = series.marks.iter().map(|mark| place(frame, extents, mark)).collect();
     if series.stroke != LineStroke::Marks {
-        let style = if series.stroke == LineStroke::Joined { look.line() } else { look.dashed() };
+        let style = if series.stroke == LineStroke::Dashed { look.dashed() } else { look.line() };
         // a mark without a place parts the line
         for stretch in places.split(Option::is_none).filter(|stretch| stretch.len() > 1) {
             svg.polyline(&stretch.iter().flatten().copied().collect::<Vec<_>>(), &style);
         }
     }
-    if series.stroke != LineStroke::Dashed {
+    if has_marks(series) {
         for (mark, place) in series.marks.iter().zip(&places) {
             let Some(place) = place else { continue };
             draw_bars(svg, frame, extents, look, mark, *place);
@@ -64,6 +64,10 @@ fn draw_series(svg: &mut Svg, frame: &Frame, extents: [&Extent; 2], look: Look, 
         }
     }
     places.iter().filter(|place| place.is_none()).count()
+}
+
+fn has_marks(series: &Series) -> bool {
+    matches!(series.stroke, LineStroke::Joined | LineStroke::Marks)
 }
 
 fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
@@ -97,7 +101,7 @@ fn draw_legend(svg: &mut Svg, (series, looks): (&[Series], &Looks), corner: [f64
         if series.stroke != LineStroke::Marks {
             svg.line([x, y], [x + SAMPLE - 8.0, y], &style);
         }
-        if series.stroke != LineStroke::Dashed {
+        if has_marks(series) {
             look.mark(svg, [x + 0.5 * (SAMPLE - 8.0), y]);
         }
         svg.text([x + SAMPLE, y + 4.5], "start", "font-size=\"12.5\"", &series.name);

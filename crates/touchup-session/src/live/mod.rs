@@ -30,7 +30,7 @@ pub use renewals::{LiveCounts, Pace};
 use touchup_core::haptic::{Footprint, RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
-use touchup_core::stylus::{BiasParams, Sample};
+use touchup_core::stylus::{BiasParams, ContactSample, Sample};
 use worker::PatchedScans;
 
 /// When the patch of an [`Engine`] is made.
@@ -56,6 +56,8 @@ pub enum Renewal {
 pub struct Engine {
     refiner: Refiner,
     patch: Reconstruction,
+    /// the sample that was answered and not followed
+    answered: Option<ContactSample>,
     /// `None`: the haptic update works on the scan itself
     detail: Option<Detail>,
 }
@@ -118,23 +120,48 @@ impl Engine {
                 Reconstruction::Beside(Box::new(Renewals::new(scans, patcher, pace, gate)?))
             }
         };
-        Ok(Self { refiner, patch, detail })
+        Ok(Self { refiner, patch, answered: None, detail })
     }
 
-    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due.
+    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due: [`Self::answer`], then
+    /// [`Self::follow`].
     ///
     /// # Errors
     /// Those of [`Refiner::push`], by which nothing is changed, and [`LiveError::Stopped`].
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
+        let update = self.answer(sample)?;
+        self.follow()?;
+        Ok(update)
+    }
+
+    /// Takes the next sample and moves the mesh by it. What is not due at once is left to [`Self::follow`], which is called first where the
+    /// sample before still needs it.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn answer(&mut self, sample: &Sample) -> Result<Update, LiveError> {
+        self.follow()?;
         let update = self.refiner.push(sample)?;
-        if let Some(contact) = self.refiner.contact().copied() {
-            match &mut self.patch {
-                Reconstruction::Without => {}
-                Reconstruction::AtEnd(patcher) => patcher.push(&contact),
-                Reconstruction::Beside(renewals) => renewals.push(&mut self.refiner, contact)?,
+        self.answered = self.refiner.contact().copied();
+        Ok(update)
+    }
+
+    /// Does what [`Self::answer`] has left for the time until the next sample: passes the sample to the patch, moves the mesh by the change
+    /// of the patch that is due, and makes ready what the next sample is likely to need.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`], [`LiveError::Refine`].
+    pub fn follow(&mut self) -> Result<(), LiveError> {
+        let Some(contact) = self.answered.take() else { return Ok(()) };
+        match &mut self.patch {
+            Reconstruction::Without => {}
+            Reconstruction::AtEnd(patcher) => patcher.push(&contact),
+            Reconstruction::Beside(renewals) => {
+                renewals.push(&mut self.refiner, contact)?;
+                self.refiner.look_ahead();
             }
         }
-        Ok(update)
+        Ok(())
     }
 
     /// To be called now and then while no sample comes: applies more of the changes of the patch, and passes it the samples
@@ -143,6 +170,7 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn rest(&mut self) -> Result<(), LiveError> {
+        self.follow()?;
         if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.rest(&mut self.refiner) } else { Ok(()) }
     }
 
@@ -154,6 +182,7 @@ impl Engine {
     /// # Errors
     /// As [`Self::rest`].
     pub fn settle(&mut self) -> Result<bool, LiveError> {
+        self.follow()?;
         let Reconstruction::Beside(renewals) = &mut self.patch else { return Ok(true) };
         let is_settled = renewals.settle(&mut self.refiner)?;
         if let (Some(detail), Some(patch)) = (&mut self.detail, renewals.take_at_rest()) {
@@ -167,6 +196,7 @@ impl Engine {
         match (&self.patch, &self.detail) {
             (Reconstruction::Without, _) => true,
             (Reconstruction::AtEnd(_), _) => false,
+            (Reconstruction::Beside(_), _) if self.answered.is_some() => false,
             (Reconstruction::Beside(renewals), None) => renewals.is_settled(),
             (Reconstruction::Beside(renewals), Some(detail)) => {
                 let is_untouched = renewals.counts.renewals == 0;
@@ -180,6 +210,7 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn catch_up(&mut self) -> Result<(), LiveError> {
+        self.follow()?;
         if let Reconstruction::Beside(renewals) = &mut self.patch {
             renewals.catch_up(&mut self.refiner)
         } else {
@@ -216,6 +247,7 @@ impl Engine {
         of_refiner: fn(&mut Refiner) -> bool,
         of_patcher: fn(&mut Patcher) -> bool,
     ) -> Result<bool, LiveError> {
+        self.follow()?;
         match &mut self.patch {
             Reconstruction::Without => Ok(of_refiner(&mut self.refiner)),
             Reconstruction::AtEnd(patcher) => Ok(of_patcher(patcher)),
@@ -229,7 +261,8 @@ impl Engine {
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn copy_patcher(&self) -> Result<Option<Receiver<Patcher>>, LiveError> {
+    pub fn copy_patcher(&mut self) -> Result<Option<Receiver<Patcher>>, LiveError> {
+        self.follow()?;
         if self.refiner.counts().contacts == 0 {
             return Ok(None);
         }
@@ -312,8 +345,8 @@ impl Engine {
         }
     }
 
-    /// Stamp of the last sample that the patch in the mesh knows, ns; `None` before the patch has seen a touch, and where it is made
-    /// at the end.
+    /// Stamp up to which the mesh shows all that the patch knows, ns; `None` before the patch has seen a touch, and where it is made at the
+    /// end.
     pub fn patched_until_ns(&self) -> Option<i64> {
         self.renewals()?.patched_until_ns()
     }

@@ -11,8 +11,8 @@ use touchup_core::haptic::Refiner;
 use touchup_core::reconstruct::{PatchDelta, Patcher};
 use touchup_core::stylus::{ContactSample, SettingError};
 
-/// Parts of a change of the patch that are taken up at one sample: some 50 µs on a mesh of a million faces.
-const AT_ONCE: usize = 40;
+/// Parts of a change of the patch that are taken up after one sample: some 100 µs on a mesh of a million faces.
+const AT_ONCE: usize = 80;
 
 /// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
 /// it to go on with.
@@ -30,7 +30,8 @@ pub struct Pace {
 }
 
 impl Default for Pace {
-    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms. No sample waits.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms, and the time that it takes to take
+    /// the change up. No sample waits.
     fn default() -> Self {
         Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
     }
@@ -68,6 +69,8 @@ pub(super) struct Renewals {
     delta: PatchDelta,
     /// … and whether all of it is in the mesh
     pub is_done: bool,
+    /// stamp up to which the mesh shows the touches, ns
+    patched_until_ns: i64,
     /// whether the change that is due is known to be late
     is_late: bool,
     /// whether the mesh is, or becomes with what is open, what the patch of all samples so far shows at once
@@ -91,6 +94,7 @@ impl Renewals {
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
             is_done: true,
+            patched_until_ns: i64::MIN,
             is_late: false,
             is_settled: true,
             at_rest: None,
@@ -134,6 +138,9 @@ impl Renewals {
     fn go_on(&mut self, refiner: &mut Refiner, most: usize) -> Result<(), LiveError> {
         if !self.is_done {
             self.is_done = refiner.go_on_following(&self.delta, most)?;
+            if self.is_done {
+                self.patched_until_ns = self.delta.until_ns;
+            }
         }
         Ok(())
     }
@@ -244,7 +251,7 @@ impl Renewals {
 
     pub fn patched_until_ns(&self) -> Option<i64> {
         // the least there is before the patch has seen a touch
-        Some(self.delta.until_ns).filter(|&until_ns| until_ns > i64::MIN && self.counts.renewals > 0)
+        Some(self.patched_until_ns).filter(|&until_ns| until_ns > i64::MIN)
     }
 
     pub fn finish(self) -> Result<Patcher, LiveError> {

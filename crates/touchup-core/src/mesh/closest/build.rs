@@ -357,19 +357,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-
-    /// So many at the same time, the last piece first.
-    struct Backwards(usize);
-
-    impl Workers for Backwards {
-        fn count(&self) -> usize {
-            self.0
-        }
-
-        fn run(&self, jobs: Vec<Job<'_>>) {
-            jobs.into_iter().rev().for_each(|job| job());
-        }
-    }
+    use crate::mesh::workers::Backwards;
 
     /// A wavy sheet whose columns lie closer and closer, so that splits at the middle are lopsided; every seventh face was removed.
     fn sheet(columns: u32, rows: u32) -> TriMesh {
