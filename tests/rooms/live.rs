@@ -73,6 +73,7 @@ fn renew(stream: &PlateStream, patcher: &mut Patcher, tree: &FaceTree, mut each:
         let here = sample.tip.stamp_ns.div_euclid(EVERY);
         if slot.replace(here).is_some_and(|before| here > before) {
             each(patcher.renewed(&stream.scan, tree));
+            patcher.renew_far(&stream.scan, tree);
         }
         patcher.push(sample);
     }
@@ -158,6 +159,7 @@ fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
             for (patcher, follower) in [(&mut settles, &mut settling), (&mut never, &mut following)] {
                 batch.iter().for_each(|contact| patcher.push(contact));
                 follow(follower, &patcher.renewed(scan, &tree));
+                patcher.renew_far(scan, &tree);
             }
             // right after the pause, and later
             if at < 3 || at % 60 == 0 {
@@ -203,6 +205,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<U
         let here = sample.stamp_ns.div_euclid(pace.every_ns);
         if slot.replace(here).is_some_and(|before| here > before) {
             due.push_back((here * pace.every_ns + pace.after_ns, patcher.renewed(&stream.scan, &tree)));
+            patcher.renew_far(&stream.scan, &tree);
         }
         patcher.push(refiner.contact().unwrap());
         if at_hand.is_none() && due.front().is_some_and(|(due_ns, _)| *due_ns <= sample.stamp_ns) {
@@ -221,6 +224,7 @@ fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<U
     };
     due.into_iter().for_each(|(_, delta)| follow(&delta));
     follow(&patcher.renewed(&stream.scan, &tree));
+    patcher.renew_far(&stream.scan, &tree);
     patcher.flush();
     for _ in 0..2 {
         follow(&patcher.renewed(&stream.scan, &tree));
@@ -383,6 +387,7 @@ fn without_samples_the_mesh_catches_up_with_the_patch() {
     for (k, batch) in [0..begins[0], begins[0]..begins[1], begins[1]..samples.len()].into_iter().enumerate() {
         contacts[batch].iter().for_each(|contact| patcher.push(contact));
         let delta = patcher.renewed(&stream.scan, &tree);
+        patcher.renew_far(&stream.scan, &tree);
         by_hand.begin_to_follow(&delta);
         while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
         // nothing is done without a permit, and the third is requested when the first two are taken up

@@ -86,6 +86,7 @@ fn a_closed_scan_that_follows_its_patch_is_closed_all_along() {
             for contacts in contacts_of(RADIUS, Some(STIFFNESS), &walk(seed, start, 13e-3)).chunks(150) {
                 contacts.iter().for_each(|contact| patcher.push(contact));
                 let delta = patcher.renewed(&scan, &tree);
+                patcher.renew_far(&scan, &tree);
                 splice.begin();
                 assert!(splice.go_on(&delta, usize::MAX, &mut mesh, &mut mesh_tree).unwrap());
                 let open = soundness(&mesh).rims.len();

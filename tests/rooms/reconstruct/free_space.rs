@@ -32,6 +32,7 @@ fn after_free_motion(scan: &TriMesh, from: &Point3<f64>, to: &Point3<f64>) -> [T
     let (mut mesh, mut mesh_tree, mut splice) = (scan.clone(), FaceTree::new(scan), Splice::default());
     let mut follow = |patcher: &mut Patcher| {
         let delta = patcher.renewed(scan, &tree);
+        patcher.renew_far(scan, &tree);
         splice.begin();
         assert!(splice.go_on(&delta, usize::MAX, &mut mesh, &mut mesh_tree).unwrap());
     };

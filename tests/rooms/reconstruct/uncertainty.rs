@@ -78,10 +78,13 @@ fn mean(values: impl IntoIterator<Item = (f64, f64)>) -> f64 {
     sum / whole
 }
 
-/// Errors over standard deviations, each with its area.
+/// Values of vertices, each with the area that its vertex stands for, m².
+type ByArea = Vec<(f64, f64)>;
+
+/// Errors over standard deviations.
 #[derive(Default)]
 struct Normalised {
-    all: Vec<(f64, f64)>,
+    all: ByArea,
 }
 
 impl Normalised {
@@ -183,7 +186,7 @@ fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> 
 
 /// Touched vertices of a plate whose stated parameters and noise differ from those of the model: normalised errors, errors in
 /// m, and standard deviations.
-fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, Vec<(f64, f64)>, Vec<(f64, f64)>) {
+fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, ByArea, ByArea) {
     let own = if matches!(noise, Foreign::Nothing) { SensorParams::default().pose_noise } else { 0.0 };
     let stylus =
         StylusParams { sensor: SensorParams { pose_noise: own, ..SensorParams::default() }, ..StylusParams::default() };

@@ -106,6 +106,8 @@ impl Worker {
                 }
                 if is_renewal {
                     gate.note_done();
+                    // while the next samples come
+                    patcher.renew_far(&scan.0, &scan.1);
                 }
             }
             patcher

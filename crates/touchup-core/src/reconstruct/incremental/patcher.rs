@@ -185,13 +185,13 @@ struct LivePatch {
     changes: GridChanges,
     /// changes that were taken in only nearby
     late: GridChanges,
-    /// times since that was taken in as a whole
+    /// renewals since they were taken in as a whole
     since_late: u32,
     /// strokes were undone: everything is to be remeshed
     is_outdated: bool,
 }
 
-/// Changes are taken in as a whole each so many times, or when there is nothing else to do.
+/// Changes are taken in as a whole after each so many renewals, or when there is nothing else to do.
 const LATE_EVERY: u32 = 4;
 
 impl LivePatch {
@@ -199,12 +199,13 @@ impl LivePatch {
     fn take_changes(&mut self) -> (GridChanges, GridChanges) {
         let changes = std::mem::take(&mut self.changes);
         self.late.extend(&changes);
-        self.since_late += 1;
-        if self.since_late < LATE_EVERY && !changes.is_empty() {
-            return (changes, GridChanges::default());
-        }
+        if changes.is_empty() { (changes, self.take_late()) } else { (changes, GridChanges::default()) }
+    }
+
+    /// What was taken in only nearby.
+    fn take_late(&mut self) -> GridChanges {
         self.since_late = 0;
-        (changes, std::mem::take(&mut self.late))
+        std::mem::take(&mut self.late)
     }
 }
 
@@ -403,6 +404,20 @@ impl Patcher {
         };
         self.live = Some(live);
         PatchDelta { until_ns: self.history.until_ns, ..delta }
+    }
+
+    /// Each fourth time, brings the field up to date where changes count less, farther off than [`Self::renewed`] looks: to be called when
+    /// its result has been passed on. The faces follow with the next.
+    ///
+    /// - `scan`, `tree`: as there.
+    pub fn renew_far(&mut self, scan: &TriMesh, tree: &FaceTree) {
+        let Some(mut live) = self.live.take() else { return };
+        live.since_late += 1;
+        if live.since_late >= LATE_EVERY && !live.is_outdated {
+            let late = live.take_late();
+            live.remesh.renew_far(&self.evidence(scan, tree, None), &late);
+        }
+        self.live = Some(live);
     }
 
     /// As [`Self::renewed`], when the stream pauses: after it the sum of all changes is what [`Self::patched`] shows of all touches so

@@ -29,6 +29,10 @@ pub(in crate::reconstruct) struct Remesh {
     /// a box that holds the region
     bounds: CellBox,
     crossings: Crossings,
+    /// around these cells faces are to be made …
+    pending: CellBox,
+    /// … and these are in the region no more
+    left: Vec<LatticeNode>,
 }
 
 /// The new faces in and around a part of the lattice.
@@ -59,7 +63,7 @@ impl Remesh {
         coarse: &CoarseBlocks,
     ) -> Renewed {
         let mut changed = self.grid.renew(evidence, changes, late);
-        let (mut core, mut left) = (CellBox::EMPTY, Vec::new());
+        let (mut core, mut left) = self.take_pending();
         for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { FURTHER } {
             self.take_up(&changed, &mut core, &mut left);
             let renewed = self.grow(evidence, core, &left, coarse);
@@ -72,6 +76,18 @@ impl Remesh {
         }
         self.take_up(&changed, &mut core, &mut left);
         self.grow(evidence, core, &left, coarse)
+    }
+
+    /// Brings the field up to date with changes of `evidence` up to where they count at all; the faces follow with [`Self::renew`].
+    pub fn renew_far(&mut self, evidence: &Evidence<'_>, late: &GridChanges) {
+        let changed = self.grid.renew(evidence, &GridChanges::default(), late);
+        let (mut core, mut left) = self.take_pending();
+        self.take_up(&changed, &mut core, &mut left);
+        (self.pending, self.left) = (core, left);
+    }
+
+    fn take_pending(&mut self) -> (CellBox, Vec<LatticeNode>) {
+        (std::mem::take(&mut self.pending), std::mem::take(&mut self.left))
     }
 
     /// The support of a vertex: touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
