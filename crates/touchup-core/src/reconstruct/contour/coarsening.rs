@@ -19,7 +19,6 @@ const BLOCK: i32 = 8;
 const FEW: usize = 4;
 /// Errors that are asked of the simplification, as shares of the tolerance: its own measure of error is a mean over planes.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-
 /// Twice the area over the longest side squared below which no merged face is: a triangle stretched thirtyfold.
 const THIN: f64 = 0.03;
 
@@ -91,14 +90,12 @@ pub(in crate::reconstruct) fn coarsen(
     let merged = |(_, faces): (LatticeNode, &Vec<PatchFace>)| merged(faces, support, position, tolerance);
     let mut coarse: Vec<Option<Vec<PatchFace>>> = blocks.iter().map(merged).collect();
     loop {
-        let mut all = PlacedFaces::new(lattice, position);
-        others.iter().for_each(|face| all.take(*face, None));
-        for (at, (_, fine)) in blocks.iter().enumerate() {
-            match &coarse[at] {
-                Some(merged) => merged.iter().for_each(|face| all.take(*face, Some(at))),
-                None => fine.iter().for_each(|face| all.take(*face, None)),
-            }
-        }
+        let mut all = PlacedFaces { lattice, position, faces: Vec::new(), reach: CellTable::default() };
+        let merged = coarse.iter().enumerate().filter_map(|(at, merged)| Some((at, merged.as_ref()?)));
+        merged.for_each(|(at, merged)| merged.iter().for_each(|face| all.take_merged(*face, at)));
+        let fine = blocks.iter().zip(&coarse).filter(|(_, merged)| merged.is_none());
+        let fine = fine.flat_map(|((_, faces), _)| faces);
+        others.iter().chain(fine).for_each(|face| all.take(*face));
         let mut unsound = all.unsound();
         unsound.extend(all.piercing(scan, tree, &replaced));
         if unsound.is_empty() {
@@ -117,15 +114,11 @@ struct PlacedFaces<'a, P> {
     position: P,
     /// each with the number of the block whose faces were merged to it
     faces: Vec<(PatchFace, Option<usize>)>,
-    /// the numbers of the faces that reach into a block
+    /// the numbers of the faces that reach into a block, where merged ones do
     reach: CellTable<LatticeNode, Vec<u32>>,
 }
 
-impl<'a, P: Fn(u32) -> Point3<f64>> PlacedFaces<'a, P> {
-    fn new(lattice: &'a Lattice, position: P) -> Self {
-        Self { lattice, position, faces: Vec::new(), reach: CellTable::default() }
-    }
-
+impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
     fn triangle(&self, face: &PatchFace) -> [Point3<f64>; 3] {
         face.corners.map(&self.position)
     }
@@ -137,10 +130,19 @@ impl<'a, P: Fn(u32) -> Point3<f64>> PlacedFaces<'a, P> {
         CellBox { lo, hi }
     }
 
-    fn take(&mut self, face: PatchFace, block: Option<usize>) {
+    /// Takes one of the faces to which those of block number `of` were merged; all of these before any other.
+    fn take_merged(&mut self, face: PatchFace, of: usize) {
         let number = self.faces.len() as u32;
         self.blocks(&face).each(|block| self.reach.get_or_default(block).push(number));
-        self.faces.push((face, block));
+        self.faces.push((face, Some(of)));
+    }
+
+    /// Takes another face: it may be as large as one of the scan.
+    fn take(&mut self, face: PatchFace) {
+        let (number, mut near) = (self.faces.len() as u32, Vec::new());
+        self.blocks(&face).each_in(&self.reach, |block, _| near.push(block));
+        near.into_iter().for_each(|block| self.reach.get_or_default(block).push(number));
+        self.faces.push((face, None));
     }
 
     /// The merged faces, with their blocks.
