@@ -2,8 +2,8 @@
 //! patch has a thread of its own.
 //!
 //! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for each minute: times of
-//! [`Engine::answer`], with the wait for what followed the sample before, how old the touches are that the patch shows (in time of the samples), how many renewals of it
-//! were late, faces, and memory of the process.
+//! [`Engine::answer`], with the wait for what followed the sample before, how old the touches are that the patch shows (in time of
+//! the samples), how many renewals of it were late, faces, and memory of the process.
 //!
 //! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
 //! the patch and pushes are not timed.

@@ -237,7 +237,7 @@ fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
 
 fn write(seen: &impl Serialize, path: Option<&Path>) {
     let text = serde_json::to_vec(seen).expect("numbers have a JSON form");
-    std::fs::write(path.expect("it is told where"), text).expect("there is room in the folder");
+    std::fs::write(path.expect("the command line names the file"), text).expect("there is room in the folder");
 }
 
 fn main() {

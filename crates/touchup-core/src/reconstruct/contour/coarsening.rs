@@ -64,7 +64,7 @@ impl CoarseBlocks {
     }
 }
 
-/// Merges faces of a patch that belong to the lattice, where no point of the surface moves by more than `tolerance` (m) and vertices of
+/// Merges faces of a patch that belong to the lattice, where the two surfaces stay within `tolerance` (m) of each other and vertices of
 /// one support go into vertices of the same. Vertices stay where they are, or go; a block stays as it is where merged faces would meet
 /// others. O(faces).
 ///

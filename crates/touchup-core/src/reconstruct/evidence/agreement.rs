@@ -68,7 +68,7 @@ impl Agreement {
     ///
     /// - `normal`: of what was touched there.
     /// - returns: `None` where it is not.
-    pub fn around(&self, contacts: &ContactMap, foot: &Point3<f64>, normal: &Vector3<f64>) -> Option<Surroundings> {
+    pub fn around(&self, contacts: &ContactMap, foot: &Point3<f64>, normal: &Vector3<f64>) -> Option<ContactsAround> {
         let (mut is_known, mut is_bent) = (false, false);
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);
         let (mut refusing, mut weights) = (0.0, 0.0);
@@ -85,7 +85,7 @@ impl Agreement {
             }
         });
         let is_ringed = count > 0.0 && sum.norm() < RINGED * self.radius * count;
-        let surroundings = if is_ringed && !is_bent { Surroundings::Smooth } else { Surroundings::BentOrOpen };
+        let surroundings = if is_ringed && !is_bent { ContactsAround::Smooth } else { ContactsAround::BentOrOpen };
         (is_known && refusing <= REFUSING * weights).then_some(surroundings)
     }
 
@@ -103,7 +103,7 @@ impl Agreement {
 
 /// What the contacts around a point of the moved scan are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Surroundings {
+pub(crate) enum ContactsAround {
     /// on one smooth surface, all around
     Smooth,
     /// on surfaces that meet in an edge, or on one side alone

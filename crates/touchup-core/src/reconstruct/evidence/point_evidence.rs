@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::direction;
-use crate::reconstruct::evidence::agreement::{Agreement, BENT, Surroundings, TouchedPart};
+use crate::reconstruct::evidence::agreement::{Agreement, BENT, ContactsAround, TouchedPart};
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::contact_uncertainty::UncertaintyParams;
 use crate::reconstruct::evidence::free_space::FreeSpace;
@@ -326,15 +326,15 @@ impl Evidence<'_> {
         let Some(around) = agreement.around(self.contacts, &scan.foot, &normal) else { return false };
         let Some(touched) = touched else { return true };
         // where a touched surface ends the scan may go around a blurred edge
-        if around == Surroundings::BentOrOpen && scan.normal.dot(&touched.gradient) < BENT {
+        if around == ContactsAround::BentOrOpen && scan.normal.dot(&touched.gradient) < BENT {
             return false;
         }
         let part = match around {
-            Surroundings::Smooth => TouchedPart::Middle,
-            Surroundings::BentOrOpen if touched.is_edge => TouchedPart::Edge,
+            ContactsAround::Smooth => TouchedPart::Middle,
+            ContactsAround::BentOrOpen if touched.is_edge => TouchedPart::Edge,
             _ if touched.lateral() > BORDER_SUPPORT * self.params.radius => TouchedPart::Beyond,
             _ if touched.is_border || touched.is_fan => TouchedPart::Border,
-            Surroundings::BentOrOpen => TouchedPart::Middle,
+            ContactsAround::BentOrOpen => TouchedPart::Middle,
         };
         agreement.is_alike(scan.value - touched.value, part)
     }
