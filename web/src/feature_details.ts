@@ -4,7 +4,7 @@
  */
 import { button, el, say, write } from "./dom";
 import { curvePlot } from "./curve_plot";
-import { coneWords, sizes, title } from "./feature_facts";
+import { coneWords, mainWords, sizes, title } from "./feature_facts";
 import { judgement } from "./feature_list";
 import { onLanguage, t } from "./language";
 import { type Feature, type Mark, Status } from "./messages";
@@ -19,10 +19,13 @@ const RELATION_TEXTS: Record<number, TextKey> = { 1: "perpendicularity", 2: "par
 export class FeatureDetails {
   readonly element: HTMLElement;
   private readonly heading = el("h2", { id: "details-title", attributes: { tabindex: "-1" } });
+  private readonly main = el("p", { class: "main-size" });
+  private readonly judged = el("p", { class: "judged" });
   private readonly numbers = el("dl", { class: "numbers" });
   private readonly curves = el("div", { class: "curves" });
   private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "60", autocomplete: "off" } });
   private readonly marks: Record<string, HTMLButtonElement>;
+  private readonly unflagButton: HTMLButtonElement;
   private shown: number | null = null;
 
   constructor(
@@ -39,14 +42,17 @@ export class FeatureDetails {
     };
     this.name.addEventListener("change", () => void this.annotate({ name: this.name.value.trim() }));
     for (const each of [measure, this.name, ...Object.values(this.marks)]) operating.guard(each);
-    operating.guard(unflag, () => this.feature?.search_radius != null);
+    operating.guard(unflag);
+    this.unflagButton = unflag;
     const field = el("div", { class: "field" }, el("label", { text: "name", attributes: { for: "feature-name" } }), this.name);
     this.element = el(
       "section",
       { class: "card details", attributes: { "aria-labelledby": "details-title" } },
       el("div", { class: "row start" }, back, this.heading),
+      el("div", {}, this.main, this.judged),
+      measure,
+      el("div", { class: "actions" }, ...Object.values(this.marks), unflag),
       this.numbers,
-      el("div", { class: "actions" }, measure, unflag, ...Object.values(this.marks)),
       field,
       this.curves,
     );
@@ -76,6 +82,11 @@ export class FeatureDetails {
     }
     write(this.heading, title(feature));
     if (document.activeElement !== this.name) this.name.value = feature.name ?? "";
+    this.unflagButton.hidden = feature.search_radius === null;
+    const [words, level] = judgement(feature);
+    write(this.main, mainWords(feature));
+    write(this.judged, words);
+    this.judged.dataset.level = level;
     this.marks.accepted.setAttribute("aria-pressed", String(feature.mark === "accepted"));
     this.marks.rejected.setAttribute("aria-pressed", String(feature.mark === "rejected"));
     this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked ?? false));
@@ -90,7 +101,7 @@ export class FeatureDetails {
   }
 
   private facts(feature: Feature): Array<[string, string]> {
-    const facts: Array<[string, string]> = [[t("state"), judgement(feature)[0]]];
+    const facts: Array<[string, string]> = [];
     for (const size of sizes(feature)) facts.push([t(size.text), size.isAtLeast ? `${size.words} · ${t("endNotFelt")}` : size.words]);
     const cone = coneWords(feature);
     if (cone !== null) facts.push([t("coneAngle"), cone]);

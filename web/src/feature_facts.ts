@@ -1,8 +1,9 @@
 /**
  * What a feature says to an operator: its name, its sizes with U, and which of its numbers wants more touches.
  */
+import { Vector3 } from "three";
 import { t } from "./language";
-import { type Feature, FittedTo, Kind, type Num, Status } from "./messages";
+import { type Feature, FittedTo, Kind, type Num, Status, triple } from "./messages";
 import { angle, expanded, length } from "./numbers";
 import type { TextKey } from "./texts";
 
@@ -62,7 +63,7 @@ export function mainWords(feature: Feature): string {
   const [first, second] = sizes(feature).filter((size) => size.text !== "depth" && size.text !== "height");
   if (first === undefined) return length(feature.depth, feature.depth_std, feature.depth_is_at_least) ?? "";
   if (first.text === "diameter") return `Ø ${first.words}`;
-  return second === undefined ? first.words : `${first.words} × ${second.words}`;
+  return second === undefined ? first.words : `${first.words.replace("\u00a0mm", "")} × ${second.words}`;
 }
 
 export function coneWords(feature: Feature): string | null {
@@ -97,4 +98,17 @@ export function urgency(feature: Feature, tolerance: number): number {
   const wanted = need(feature, tolerance);
   if (wanted === null) return 0;
   return wanted.kind === "wide" ? wanted.u / tolerance : Infinity;
+}
+
+/** The one whose center is nearest, of those that somebody asks for. @param within farther than this none is, m. */
+export function nearestTo(place: Vector3, features: Feature[], within: number): Feature | null {
+  let nearest: Feature | null = null;
+  let least = within;
+  for (const feature of features) {
+    const center = triple(feature.center);
+    if (center === null || isMinor(feature)) continue;
+    const distance = place.distanceTo(new Vector3(...center));
+    if (distance < least) [nearest, least] = [feature, distance];
+  }
+  return nearest;
 }

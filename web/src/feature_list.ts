@@ -32,7 +32,7 @@ export class FeatureList {
     private readonly onSelect: (id: number) => void,
     onFilter: () => void,
   ) {
-    const detect = button("fresh", "detect", () => void operating.call("~/detect_features", {}, (answer) => answer.message));
+    const detect = button("search", "detect", () => void operating.call("~/detect_features", {}, (answer) => answer.message));
     this.all.checked = settings.showsAll;
     this.all.addEventListener("change", () => {
       keep({ showsAll: this.all.checked });
@@ -72,7 +72,7 @@ export class FeatureList {
   private add(id: number): Row {
     const [number, name, size, state] = ["number", "name", "size", "state"].map((part) => el("span", { class: part }));
     const element = el("button", { class: "feature", attributes: { type: "button" }, onClick: () => this.onSelect(id) });
-    element.append(number, name, size, state);
+    element.append(number, name, state, size);
     this.list.append(el("li", {}, element));
     const row = { element, number, name, size, state };
     this.rows.set(id, row);

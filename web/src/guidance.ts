@@ -3,8 +3,9 @@
  *
  * Next is the feature whose U is widest against the tolerance; one that nothing is known of comes first.
  */
+import type { Vector3 } from "three";
 import { el, write } from "./dom";
-import { isAsked, kindText, need, title, urgency } from "./feature_facts";
+import { isAsked, nearestTo, need, title, urgency } from "./feature_facts";
 import { onLanguage, t } from "./language";
 import type { Feature } from "./messages";
 import type { Model } from "./model";
@@ -19,7 +20,8 @@ export class Guidance {
   private readonly bar = el("progress", { id: "progress", label: "progress" });
   private readonly count = el("label", { attributes: { for: "progress" } });
   private target: Feature | null = null;
-  private hasArrow = false;
+  /** Where the green arrow points, m. */
+  private arrowAt: Vector3 | null = null;
 
   constructor(
     private readonly model: Model,
@@ -40,12 +42,16 @@ export class Guidance {
     this.show();
   }
 
-  /** Whether the green arrow is drawn. */
-  arrow(isThere: boolean): void {
-    if (isThere !== this.hasArrow) {
-      this.hasArrow = isThere;
-      this.show();
-    }
+  /** The green arrow is for the feature next to the tip, which may be another one than that to be touched next. */
+  arrow(at: Vector3 | null): void {
+    this.arrowAt = at;
+    this.showHow();
+  }
+
+  private showHow(): void {
+    const pointed = this.arrowAt === null ? null : nearestTo(this.arrowAt, this.model.features, Infinity);
+    const isHere = pointed !== null && pointed.id === this.target?.id;
+    write(this.how, t(isHere ? "guidanceArrow" : "guidanceSpread"));
   }
 
   private show(): void {
@@ -54,7 +60,8 @@ export class Guidance {
     const reached = asked.filter((feature) => need(feature, tolerance) === null);
     this.target = null;
     for (const feature of asked) {
-      if (feature.is_locked) continue;
+      // somebody is content with it as it is
+      if (feature.is_locked || feature.mark === "accepted") continue;
       const most = this.target === null ? 0 : urgency(this.target, tolerance);
       if (urgency(feature, tolerance) > most) this.target = feature;
     }
@@ -69,13 +76,13 @@ export class Guidance {
     }
     write(this.next, t("guidanceNext", { feature: title(this.target) }));
     write(this.why, this.reason(this.target));
-    write(this.how, t(this.hasArrow ? "guidanceArrow" : "guidanceSpread"));
+    this.showHow();
   }
 
   private reason(feature: Feature): string {
     const wanted = need(feature, settings.tolerance);
     if (wanted === null) return "";
-    if (wanted.kind === "untouched") return t("needUntouched", { kind: t(kindText(feature.kind)) });
+    if (wanted.kind === "untouched") return t("needUntouched");
     if (wanted.kind === "unknown") return t("needUnknown", { touches: wanted.touches });
     return t("needWide", {
       size: t(wanted.size),

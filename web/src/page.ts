@@ -4,7 +4,7 @@ import type { Connection } from "./connection";
 import { Controls } from "./controls";
 import { button, el, write } from "./dom";
 import { FeatureDetails } from "./feature_details";
-import { isMinor, mainWords, title } from "./feature_facts";
+import { isMinor, mainWords, nearestTo, title } from "./feature_facts";
 import { FeatureList } from "./feature_list";
 import { FlagMenu } from "./flag_menu";
 import { Guidance } from "./guidance";
@@ -21,7 +21,7 @@ import { Operating } from "./operating";
 import { Picture } from "./picture";
 import { Sessions } from "./sessions";
 import { settings } from "./settings";
-import { StatusBar } from "./status_bar";
+import { applyTheme, StatusBar } from "./status_bar";
 import { installTestHook } from "./test_hook";
 import { ForceBar, ViewBar } from "./view_bar";
 import { Vector3 } from "three";
@@ -30,6 +30,7 @@ import { Vector3 } from "three";
 const NEAR = 0.05;
 
 export function buildPage(connection: Connection): void {
+  applyTheme();
   const store = new MeshStore();
   const model = new Model(connection);
   const notices = new Notices();
@@ -102,8 +103,8 @@ export function buildPage(connection: Connection): void {
     connection.on("tip", ({ markers }) => {
       picture.tip.markers(markers);
       const { place, next } = picture.tip.state;
-      guidance.arrow(next !== null);
-      picture.labels.showTip(place, tipWords());
+      guidance.arrow(next);
+      picture.labels.showTip(place, ...tipWords());
       if (place !== null) picture.camera.tipAt(place);
       picture.stage.ask();
     });
@@ -115,19 +116,12 @@ export function buildPage(connection: Connection): void {
     connection.on("path", ({ poses }) => picture.showPath(poses.map(({ pose }) => pose.position)));
   }
 
-  /** "0.12 mm · Hole 3 Ø 8.02 ± 0.04 mm" */
-  function tipWords(): string {
+  /** "0.12 mm", and "Hole 3 Ø 8.02 ± 0.04 mm" of the feature that is nearest. */
+  function tipWords(): [string, string] {
     const { place, distance } = picture.tip.state;
     const far = distance === null ? t("tipFar") : `${decimal(distance * 1e3, 2)}\u00a0mm`;
-    let nearest: Feature | null = null;
-    let least = NEAR;
-    for (const feature of model.features) {
-      const center = triple(feature.center);
-      if (place === null || center === null || isMinor(feature)) continue;
-      const distance = place.distanceTo(new Vector3(...center));
-      if (distance < least) [nearest, least] = [feature, distance];
-    }
-    return nearest === null ? far : `${far} · ${title(nearest)} ${mainWords(nearest)}`;
+    const nearest = place === null ? null : nearestTo(place, model.features, NEAR);
+    return [far, nearest === null ? "" : `${title(nearest)} ${mainWords(nearest)}`];
   }
 
   function listenToMesh(): void {

@@ -29,7 +29,6 @@ export class StatusBar {
     model.on(["state", "line", "diagnostics"], () => this.show());
     onLanguage(() => this.show());
     this.show();
-    applyTheme();
   }
 
   private show(): void {
@@ -69,6 +68,7 @@ export class StatusBar {
   }
 }
 
-function applyTheme(): void {
+/** Before anything asks the style sheet for a colour. */
+export function applyTheme(): void {
   document.documentElement.dataset.theme = settings.theme;
 }
