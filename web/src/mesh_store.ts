@@ -46,6 +46,8 @@ export class MeshStore {
   /** What the parts of the whole state named so far; null between whole states. */
   private whole: { vertices: Uint8Array; faces: Uint8Array } | null = null;
   private nextPart = 0;
+  /** How much of the whole state that is coming has come, 0 to 1. */
+  progress = 0;
 
   /** @throws GapError when it does not continue what is here, or its counts do not come out. */
   apply(patch: MeshPatch): void {
@@ -56,6 +58,7 @@ export class MeshStore {
     this.setFaces(patch);
     for (const vertex of patch.removedVertices) this.removeVertex(vertex);
     this.nextPart = patch.part + 1;
+    this.progress = this.nextPart / patch.partCount;
     if (this.nextPart < patch.partCount) return;
     this.nextPart = 0;
     this.sweep();

@@ -28,6 +28,9 @@ export class MeshView {
   /** Before each frame: takes over what the store says has changed. */
   update(): void {
     const { store } = this;
+    // drawing a part that comes in a hundred pieces costs more than all of it once
+    this.mesh.visible = store.version > 0;
+    if (!this.mesh.visible) return;
     const hasDeviation = store.deviation !== null;
     if (this.generation !== store.generation || this.hasDeviation !== hasDeviation) this.rebuild();
     else this.markRanges();

@@ -16,7 +16,7 @@ import type { Feature } from "./messages";
 import { triple } from "./messages";
 import { Model } from "./model";
 import { Notices } from "./notices";
-import { decimal } from "./numbers";
+import { decimal, percent } from "./numbers";
 import { Operating } from "./operating";
 import { Picture } from "./picture";
 import { Sessions } from "./sessions";
@@ -61,6 +61,7 @@ export function buildPage(connection: Connection): void {
   const sessions = new Sessions(notices);
   const legend = new Legend(store, picture.mesh, picture.stage);
   const force = new ForceBar();
+  const loading = el("p", { class: "loading", attributes: { role: "status" } });
   const status = new StatusBar(model, () => picture.theme());
   const controls = new Controls(model, operating, () => void sessions.show());
   layOut();
@@ -74,10 +75,11 @@ export function buildPage(connection: Connection): void {
   listenToMesh();
   installTestHook(store, picture);
   rewrite(document.body);
+  write(loading, t("loadingPart", { share: percent(0) }));
 
   function layOut(): void {
     const sheet = button("sheet", "sheet", () => document.body.classList.toggle("sheet-open"), "ghost sheet-handle", true);
-    picture.element.append(new ViewBar(picture.camera).element, force.element, legend.element, flagMenu.element, notices.element);
+    picture.element.append(loading, new ViewBar(picture.camera).element, force.element, legend.element, flagMenu.element, notices.element);
     const scroll = el("div", { class: "scroll" }, whyNot(), guidance.element, details.element, list.element);
     const panel = el("aside", { class: "panel", label: "panel" }, sheet, scroll, arm.element);
     panel.removeAttribute("title");
@@ -129,11 +131,9 @@ export function buildPage(connection: Connection): void {
       onOther: () => picture.camera.forget(),
       onGap: () => notices.bad(t("failedMesh")),
       onChange: () => {
-        if (store.version === 0) {
-          // the first parts of the first whole state: the part grows in the picture
-          picture.camera.show("whole");
-          if (store.faceCount === 0) return;
-        }
+        loading.hidden = store.version > 0;
+        write(loading, t("loadingPart", { share: percent(store.progress) }));
+        if (store.version === 0) return;
         picture.camera.frameOnce();
         legend.meshChanged();
         picture.stage.ask();

@@ -43,6 +43,7 @@ export const texts = {
   newSessionQuestion: ["Begin again with the scan? The touches so far stay in the old session.", "Neu mit dem Scan beginnen? Die bisherigen Antastungen bleiben in der alten Sitzung.", "¿Empezar de nuevo con el escaneo? Los toques hechos quedan en la sesión anterior."],
   begun: ["A new session has begun.", "Eine neue Sitzung hat begonnen.", "Ha empezado una nueva sesión."],
   sessions: ["Sessions", "Sitzungen", "Sesiones"],
+  loadingPart: ["Loading the part … {share}", "Das Teil wird geladen … {share}", "Cargando la pieza … {share}"],
   loading: ["Loading …", "Lädt …", "Cargando …"],
   noSessions: ["No session is kept yet.", "Noch ist keine Sitzung gespeichert.", "Todavía no hay sesiones guardadas."],
   noFiles: ["No files yet.", "Noch keine Dateien.", "Sin archivos todavía."],
