@@ -8,7 +8,7 @@ import { button, el, say, write } from "./dom";
 import { title } from "./feature_facts";
 import { HoldToRun } from "./hold_to_run";
 import { onLanguage, t } from "./language";
-import { type Answer, type Feature, PLANNED, type ProbeResult, STOPPED_FROM } from "./messages";
+import { type Answer, type NotedFeature, PLANNED, type ProbeResult, type State, STOPPED_FROM } from "./messages";
 import type { Model } from "./model";
 import type { Operating } from "./operating";
 import { settings } from "./settings";
@@ -63,8 +63,12 @@ export class ArmPanel {
     this.show();
   }
 
-  private get feature(): Feature | undefined {
+  private get feature(): NotedFeature | undefined {
     return this.model.feature(this.model.selected);
+  }
+
+  private get arm(): State["arm"] {
+    return this.model.state?.arm ?? null;
   }
 
   private get canPlan(): boolean {
@@ -72,7 +76,7 @@ export class ArmPanel {
   }
 
   private get canRun(): boolean {
-    return (this.step === "approved" || this.step === "running") && this.model.state?.arm?.may_move === true;
+    return (this.step === "approved" || this.step === "running") && this.arm?.may_move === true && this.arm.stays_because == null;
   }
 
   private go(step: Step): void {
@@ -82,15 +86,16 @@ export class ArmPanel {
   }
 
   private show(): void {
-    const arm = this.model.state?.arm ?? null;
+    const { arm } = this;
     this.element.hidden = arm === null;
     // a plan is for one feature: another one is chosen, another plan is needed
     if (this.model.selected !== this.target && (this.step === "planned" || this.step === "approved")) return this.go("choose");
-    this.recover.hidden = !this.needsRecovery;
+    const stays = arm?.stays_because ?? null;
+    this.recover.hidden = !this.needsRecovery && stays === null;
     this.run.classList.toggle("held", this.hold.isHeld);
     const label = this.run.querySelector("span");
     if (label !== null) say(label, this.hold.isHeld ? "holding" : "holdToRun");
-    if (arm !== null) write(this.words, this.sentence(arm.may_move, arm.motion));
+    if (arm !== null) write(this.words, stays === null ? this.sentence(arm.may_move, arm.motion) : t("armStays", { reason: stays }));
   }
 
   private sentence(mayMove: boolean, motion: string): string {

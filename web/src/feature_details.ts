@@ -7,7 +7,7 @@ import { curvePlot } from "./curve_plot";
 import { coneWords, mainWords, sizes, title } from "./feature_facts";
 import { judgement } from "./feature_list";
 import { onLanguage, t } from "./language";
-import { type Feature, type Mark, Status } from "./messages";
+import { type NotedFeature, type Mark, Status } from "./messages";
 import type { Model } from "./model";
 import { angle, length, percent } from "./numbers";
 import type { Operating } from "./operating";
@@ -23,7 +23,7 @@ export class FeatureDetails {
   private readonly judged = el("p", { class: "judged" });
   private readonly numbers = el("dl", { class: "numbers" });
   private readonly curves = el("div", { class: "curves" });
-  private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "60", autocomplete: "off" } });
+  private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "80", autocomplete: "off" } });
   private readonly marks: Record<string, HTMLButtonElement>;
   private readonly unflagButton: HTMLButtonElement;
   private shown: number | null = null;
@@ -36,8 +36,8 @@ export class FeatureDetails {
     const measure = button("measure", "measureBetter", () => void this.measure(), "primary");
     const unflag = button("reject", "unflag", () => void this.unflag());
     this.marks = {
-      accepted: button("accept", "accept", () => void this.annotate({ mark: this.mark === "accepted" ? "" : "accepted" })),
-      rejected: button("reject", "reject", () => void this.annotate({ mark: this.mark === "rejected" ? "" : "rejected" })),
+      accepted: button("accept", "accept", () => void this.annotate({ mark: this.mark === "accepted" ? "none" : "accepted" })),
+      rejected: button("reject", "reject", () => void this.annotate({ mark: this.mark === "rejected" ? "none" : "rejected" })),
       locked: button("lock", "lock", () => void this.annotate({ is_locked: !this.feature?.is_locked })),
     };
     this.name.addEventListener("change", () => void this.annotate({ name: this.name.value.trim() }));
@@ -65,12 +65,12 @@ export class FeatureDetails {
     this.show();
   }
 
-  private get feature(): Feature | undefined {
+  private get feature(): NotedFeature | undefined {
     return this.model.feature(this.model.selected);
   }
 
   private get mark(): Mark {
-    return this.feature?.mark ?? "";
+    return this.feature?.mark ?? "none";
   }
 
   private show(): void {
@@ -81,7 +81,7 @@ export class FeatureDetails {
       return;
     }
     write(this.heading, title(feature));
-    if (document.activeElement !== this.name) this.name.value = feature.name ?? "";
+    if (document.activeElement !== this.name) this.name.value = feature.name;
     this.unflagButton.hidden = feature.search_radius === null;
     const [words, level] = judgement(feature);
     write(this.main, mainWords(feature));
@@ -89,7 +89,7 @@ export class FeatureDetails {
     this.judged.dataset.level = level;
     this.marks.accepted.setAttribute("aria-pressed", String(feature.mark === "accepted"));
     this.marks.rejected.setAttribute("aria-pressed", String(feature.mark === "rejected"));
-    this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked ?? false));
+    this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked));
     const lock = this.marks.locked.querySelector("span");
     if (lock !== null) say(lock, feature.is_locked ? "unlock" : "lock");
     this.numbers.replaceChildren(...this.facts(feature).flatMap(([term, words]) => [el("dt", {}, term), el("dd", {}, words)]));
@@ -100,7 +100,7 @@ export class FeatureDetails {
     }
   }
 
-  private facts(feature: Feature): Array<[string, string]> {
+  private facts(feature: NotedFeature): Array<[string, string]> {
     const facts: Array<[string, string]> = [];
     for (const size of sizes(feature)) facts.push([t(size.text), size.isAtLeast ? `${size.words} · ${t("endNotFelt")}` : size.words]);
     const cone = coneWords(feature);
@@ -120,7 +120,7 @@ export class FeatureDetails {
     return [...facts, ...this.relations(feature)];
   }
 
-  private relations(feature: Feature): Array<[string, string]> {
+  private relations(feature: NotedFeature): Array<[string, string]> {
     const facts: Array<[string, string]> = [];
     for (const relation of this.model.relations) {
       const key = RELATION_TEXTS[relation.kind];
@@ -147,7 +147,7 @@ export class FeatureDetails {
     if (feature === undefined) return;
     const request = {
       kind: feature.kind,
-      point: { header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" }, point: feature.center },
+      point: { header: { frame_id: this.model.frame }, point: feature.center },
       search_radius: feature.search_radius ?? Math.max(feature.diameter ?? 0, feature.width ?? 0, feature.length ?? 0, 4e-3) * 0.75,
     };
     await this.operating.call("~/flag_feature", request, () => t("willMeasure", { feature: title(feature) }));
@@ -161,7 +161,6 @@ export class FeatureDetails {
   private async annotate(change: { name?: string; mark?: Mark; is_locked?: boolean }): Promise<void> {
     const { feature } = this;
     if (feature === undefined) return;
-    const now = { id: feature.id, name: feature.name ?? "", mark: this.mark, is_locked: feature.is_locked ?? false };
-    await this.operating.call("~/annotate_feature", { ...now, ...change });
+    await this.operating.call("~/annotate_feature", { id: feature.id, ...change });
   }
 }

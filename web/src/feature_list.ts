@@ -5,7 +5,7 @@
 import { button, el, write } from "./dom";
 import { isAsked, isMinor, kindText, mainWords, need } from "./feature_facts";
 import { onLanguage, t } from "./language";
-import { type Feature, FittedTo, Status } from "./messages";
+import { type NotedFeature, FittedTo, Status } from "./messages";
 import type { Model } from "./model";
 import { percent } from "./numbers";
 import type { Operating } from "./operating";
@@ -79,7 +79,7 @@ export class FeatureList {
     return row;
   }
 
-  private fill(row: Row, feature: Feature): void {
+  private fill(row: Row, feature: NotedFeature): void {
     write(row.number, String(feature.id));
     write(row.name, feature.name || t(kindText(feature.kind)));
     write(row.size, mainWords(feature));
@@ -92,7 +92,7 @@ export class FeatureList {
 }
 
 /** What is to be said of it in a few words, with a sign that needs no colour. */
-export function judgement(feature: Feature): [words: string, level: "good" | "open" | "plain"] {
+export function judgement(feature: NotedFeature): [words: string, level: "good" | "open" | "plain"] {
   const lock = feature.is_locked ? ` · ${t("locked")}` : "";
   if (feature.mark === "accepted") return [`✓ ${t("accepted")}${lock}`, "good"];
   if (feature.mark === "rejected") return [`✕ ${t("rejected")}${lock}`, "plain"];

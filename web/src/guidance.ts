@@ -7,7 +7,7 @@ import type { Vector3 } from "three";
 import { el, write } from "./dom";
 import { isAsked, nearestTo, need, title, urgency } from "./feature_facts";
 import { onLanguage, t } from "./language";
-import type { Feature } from "./messages";
+import type { NotedFeature } from "./messages";
 import type { Model } from "./model";
 import { decimal, typedMillimetres, uncertainty } from "./numbers";
 import { keep, settings } from "./settings";
@@ -19,14 +19,14 @@ export class Guidance {
   private readonly how = el("p", { class: "muted how" });
   private readonly bar = el("progress", { id: "progress", label: "progress" });
   private readonly count = el("label", { attributes: { for: "progress" } });
-  private target: Feature | null = null;
+  private target: NotedFeature | null = null;
   /** Where the green arrow points, m. */
   private arrowAt: Vector3 | null = null;
 
   constructor(
     private readonly model: Model,
     private readonly onTolerance: () => void,
-    onShow: (feature: Feature) => void,
+    onShow: (feature: NotedFeature) => void,
   ) {
     this.next.addEventListener("click", () => this.target !== null && onShow(this.target));
     this.element = el(
@@ -79,7 +79,7 @@ export class Guidance {
     this.showHow();
   }
 
-  private reason(feature: Feature): string {
+  private reason(feature: NotedFeature): string {
     const wanted = need(feature, settings.tolerance);
     if (wanted === null) return "";
     if (wanted.kind === "untouched") return t("needUntouched");

@@ -5,7 +5,7 @@
 import { Vector3 } from "three";
 import { el, write } from "./dom";
 import { title } from "./feature_facts";
-import { type Feature, Status, triple } from "./messages";
+import { type NotedFeature, Status, triple } from "./messages";
 import type { Stage } from "./stage";
 
 /** The words at the tip stand so far beside it, as in the style sheet, px. */
@@ -33,7 +33,7 @@ export class Labels {
     stage.afterFrame.push(() => this.move());
   }
 
-  show(features: Feature[], selected: number | null): void {
+  show(features: NotedFeature[], selected: number | null): void {
     const shown = new Set<number>();
     for (const feature of features) {
       const center = triple(feature.center);

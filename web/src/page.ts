@@ -12,7 +12,7 @@ import { onLanguage, rewrite, t } from "./language";
 import { Legend } from "./legend";
 import { feedMesh } from "./mesh_feed";
 import { MeshStore } from "./mesh_store";
-import type { Feature } from "./messages";
+import type { NotedFeature } from "./messages";
 import { triple } from "./messages";
 import { Model } from "./model";
 import { Notices } from "./notices";
@@ -35,7 +35,7 @@ export function buildPage(connection: Connection): void {
   const model = new Model(connection);
   const notices = new Notices();
   const operating = new Operating(connection, model, notices);
-  const flagMenu = new FlagMenu(operating);
+  const flagMenu = new FlagMenu(model, operating);
   const picture = new Picture(store, {
     onSelect: (id) => model.select(model.selected === id ? null : id),
     onTap: (hit, x, y) => {
@@ -46,12 +46,12 @@ export function buildPage(connection: Connection): void {
     },
   });
   flagMenu.onClose = () => picture.showMark(null);
-  const lookAt = (feature: Feature): void => {
+  const lookAt = (feature: NotedFeature): void => {
     const center = triple(feature.center);
     model.select(feature.id);
     if (center !== null) picture.camera.lookAt(new Vector3(...center));
   };
-  const shownFeatures = (): Feature[] => model.features.filter((feature) => settings.showsAll || !isMinor(feature) || feature.id === model.selected);
+  const shownFeatures = (): NotedFeature[] => model.features.filter((feature) => settings.showsAll || !isMinor(feature) || feature.id === model.selected);
   const showFeatures = (): void => picture.showFeatures(shownFeatures(), model.selected);
 
   const list = new FeatureList(model, operating, (id) => model.select(id), showFeatures);
@@ -133,7 +133,7 @@ export function buildPage(connection: Connection): void {
       onChange: () => {
         loading.hidden = store.version > 0;
         write(loading, t("loadingPart", { share: percent(store.progress) }));
-        if (store.version === 0) return;
+        if (!store.isWhole) return;
         picture.camera.frameOnce();
         legend.meshChanged();
         picture.stage.ask();

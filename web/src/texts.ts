@@ -172,6 +172,7 @@ export const texts = {
   armApproved: ["Approved. The arm moves while you hold the button.", "Freigegeben. Der Arm bewegt sich, solange Sie den Knopf halten.", "Aprobado. El brazo se mueve mientras mantenga el botón."],
   armRuns: ["The arm moves. Let go and it stands.", "Der Arm bewegt sich. Loslassen, und er steht.", "El brazo se mueve. Suelte y se detiene."],
   armStands: ["The arm stands. Hold to go on.", "Der Arm steht. Halten, um fortzufahren.", "El brazo está quieto. Mantenga para seguir."],
+  armStays: ["The arm stays where it is: {reason}", "Der Arm bleibt, wo er ist: {reason}", "El brazo se queda donde está: {reason}"],
   armRetracts: ["The arm draws back.", "Der Arm zieht sich zurück.", "El brazo se retira."],
   plan: ["Show the plan", "Plan zeigen", "Mostrar el plan"],
   approve: ["Approve the plan", "Plan freigeben", "Aprobar el plan"],
@@ -185,7 +186,7 @@ export const texts = {
   stopped: ["Stopped: the arm stays where it is.", "Gestoppt: Der Arm bleibt, wo er ist.", "Parado: el brazo se queda donde está."],
   noEmergencyStop: ["This stop is not an emergency stop. In danger press the red button at the cell.", "Dieser Stopp ist kein Not-Halt. Bei Gefahr den roten Knopf an der Zelle drücken.", "Esta parada no es una parada de emergencia. En peligro, pulse el botón rojo de la celda."],
   // what went wrong
-  failedRefused: ["That did not work.", "Das ging nicht.", "No ha funcionado."],
+  failedRefused: ["That did not work: {reason}", "Das ging nicht: {reason}", "No ha funcionado: {reason}"],
   failedLost: ["The connection was lost before an answer came.", "Die Verbindung brach vor der Antwort ab.", "Se perdió la conexión antes de la respuesta."],
   failedLate: ["No answer came in time.", "Es kam rechtzeitig keine Antwort.", "No llegó respuesta a tiempo."],
   failedFault: ["A fault of the page. Loading it anew may help.", "Ein Fehler der Seite. Neu laden kann helfen.", "Fallo de la página. Recargarla puede ayudar."],
