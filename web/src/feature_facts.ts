@@ -1,0 +1,100 @@
+/**
+ * What a feature says to an operator: its name, its sizes with U, and which of its numbers wants more touches.
+ */
+import { t } from "./language";
+import { type Feature, FittedTo, Kind, type Num, Status } from "./messages";
+import { angle, expanded, length } from "./numbers";
+import type { TextKey } from "./texts";
+
+const KIND_TEXTS: TextKey[] = [
+  "kindUnknown", "kindHole", "kindSlot", "kindPocket", "kindBoss", "kindEdge", "kindCorner", "kindPlane", "kindCylinder", "kindNotch",
+];
+
+/** Kinds that somebody may flag, the likeliest first. */
+export const FLAGGABLE = [
+  Kind.hole, Kind.slot, Kind.pocket, Kind.boss, Kind.edge, Kind.corner, Kind.plane, Kind.cylinder, Kind.notch, Kind.unknown,
+];
+
+export function kindText(kind: number): TextKey {
+  return KIND_TEXTS[kind] ?? "kindUnknown";
+}
+
+/** "Hole 3", or "Hole 3 · upper left" where it was named. */
+export function title(feature: Feature): string {
+  const plain = `${t(kindText(feature.kind))} ${feature.id}`;
+  return feature.name ? `${plain} · ${feature.name}` : plain;
+}
+
+/** A part has dozens of edges, corners and planes: they speak for themselves. */
+export function isMinor(feature: Feature): boolean {
+  const { kind, status } = feature;
+  return (kind === Kind.edge || kind === Kind.corner || kind === Kind.plane) && status === Status.found;
+}
+
+export interface Size {
+  text: TextKey;
+  /** With U and unit. */
+  words: string;
+  value: number;
+  /** Expanded uncertainty, m; null where it is not known. */
+  u: number | null;
+  isAtLeast: boolean;
+}
+
+/** Every length that is known of it, the one that it is ordered by first. */
+export function sizes(feature: Feature): Size[] {
+  const size = (text: TextKey, value: Num, std: Num, isAtLeast = false): Size | null => {
+    const words = length(value, isAtLeast ? null : std, isAtLeast);
+    return words === null ? null : { text, words, value: value ?? 0, u: expanded(std), isAtLeast };
+  };
+  const all = [
+    size("diameter", feature.diameter, feature.diameter_std),
+    size("width", feature.width, feature.width_std),
+    size("length", feature.length, feature.length_std),
+    size(feature.kind === Kind.boss ? "height" : "depth", feature.depth, feature.depth_std, feature.depth_is_at_least),
+  ];
+  return all.filter((each) => each !== null);
+}
+
+/** "Ø 8.021 ± 0.025 mm", "6.00 × 20.0 mm": its main numbers in one line. */
+export function mainWords(feature: Feature): string {
+  if (feature.status === Status.flagged) return t("notMeasured");
+  const [first, second] = sizes(feature).filter((size) => size.text !== "depth" && size.text !== "height");
+  if (first === undefined) return length(feature.depth, feature.depth_std, feature.depth_is_at_least) ?? "";
+  if (first.text === "diameter") return `Ø ${first.words}`;
+  return second === undefined ? first.words : `${first.words} × ${second.words}`;
+}
+
+export function coneWords(feature: Feature): string | null {
+  return angle(feature.cone_angle, feature.cone_angle_std);
+}
+
+/** Why a feature needs touches. */
+export type Need =
+  | { kind: "untouched" }
+  | { kind: "unknown"; touches: number }
+  | { kind: "wide"; size: TextKey; u: number };
+
+/** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
+export function need(feature: Feature, tolerance: number): Need | null {
+  if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
+    return { kind: feature.touch_count > 0 ? "unknown" : "untouched", touches: feature.touch_count };
+  }
+  const asked = sizes(feature).filter((size) => !size.isAtLeast);
+  const [widest] = asked.sort((a, b) => (b.u ?? Infinity) - (a.u ?? Infinity));
+  if (widest === undefined) return null;
+  if (widest.u === null) return { kind: "unknown", touches: feature.touch_count };
+  return widest.u <= tolerance ? null : { kind: "wide", size: widest.text, u: widest.u };
+}
+
+/** Whether the tolerance is asked of it: it has a size, and nobody threw it out. */
+export function isAsked(feature: Feature): boolean {
+  return !isMinor(feature) && feature.mark !== "rejected";
+}
+
+/** How much a feature wants touches: U over the tolerance, endless where nothing is known. */
+export function urgency(feature: Feature, tolerance: number): number {
+  const wanted = need(feature, tolerance);
+  if (wanted === null) return 0;
+  return wanted.kind === "wide" ? wanted.u / tolerance : Infinity;
+}

@@ -1,0 +1,55 @@
+/** After a tap on the part: which kind of feature is to be looked for there. */
+import { button, el } from "./dom";
+import { FLAGGABLE, kindText } from "./feature_facts";
+import { t } from "./language";
+import type { Operating } from "./operating";
+
+/** How far around is looked when nothing else is known: the parameter flag_radius_mm. */
+const AS_CONFIGURED = 0;
+
+export class FlagMenu {
+  readonly element = el("div", { class: "flag-menu", label: "flagHere", attributes: { role: "dialog", hidden: "" } });
+  private place: [number, number, number] = [0, 0, 0];
+  /** Called when it closes, so that the mark on the part goes. */
+  onClose: () => void = () => {};
+
+  constructor(private readonly operating: Operating) {
+    const kinds = FLAGGABLE.map((kind) => operating.guard(button(null, kindText(kind), () => void this.flag(kind))));
+    const close = button("close", "close", () => this.close(), "ghost", true);
+    this.element.append(
+      el("div", { class: "row" }, el("p", {}, el("strong", { text: "flagHere" })), close),
+      el("p", { class: "muted", text: "flagHow" }),
+      el("div", { class: "kinds" }, ...kinds),
+    );
+    this.element.addEventListener("keydown", (event) => event.key === "Escape" && this.close());
+  }
+
+  /** @param place on the part, m. @param x, y where to open, px in the picture. */
+  open(place: [number, number, number], x: number, y: number): void {
+    this.place = place;
+    this.element.hidden = false;
+    const around = this.element.parentElement;
+    const { offsetWidth, offsetHeight } = this.element;
+    const left = Math.max(8, Math.min(x + 12, (around?.clientWidth ?? 0) - offsetWidth - 8));
+    const top = Math.max(8, Math.min(y + 12, (around?.clientHeight ?? 0) - offsetHeight - 8));
+    this.element.style.transform = `translate(${left}px, ${top}px)`;
+    this.element.querySelector<HTMLButtonElement>(".kinds button")?.focus({ preventScroll: true });
+  }
+
+  close(): void {
+    if (this.element.hidden) return;
+    this.element.hidden = true;
+    this.onClose();
+  }
+
+  private async flag(kind: number): Promise<void> {
+    const [x, y, z] = this.place;
+    this.close();
+    const request = {
+      kind,
+      point: { header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" }, point: { x, y, z } },
+      search_radius: AS_CONFIGURED,
+    };
+    await this.operating.call("~/flag_feature", request, () => t("flagged", { kind: t(kindText(kind)) }));
+  }
+}

@@ -1,0 +1,105 @@
+/**
+ * Where to touch next and why, and how far it is to the tolerance that was asked for.
+ *
+ * Next is the feature whose U is widest against the tolerance; one that nothing is known of comes first.
+ */
+import { el, write } from "./dom";
+import { isAsked, kindText, need, title, urgency } from "./feature_facts";
+import { onLanguage, t } from "./language";
+import type { Feature } from "./messages";
+import type { Model } from "./model";
+import { decimal, typedMillimetres, uncertainty } from "./numbers";
+import { keep, settings } from "./settings";
+
+export class Guidance {
+  readonly element: HTMLElement;
+  private readonly next = el("button", { class: "next", attributes: { type: "button" } });
+  private readonly why = el("p", { class: "why" });
+  private readonly how = el("p", { class: "muted how" });
+  private readonly bar = el("progress", { id: "progress", label: "progress" });
+  private readonly count = el("label", { attributes: { for: "progress" } });
+  private target: Feature | null = null;
+  private hasArrow = false;
+
+  constructor(
+    private readonly model: Model,
+    private readonly onTolerance: () => void,
+    onShow: (feature: Feature) => void,
+  ) {
+    this.next.addEventListener("click", () => this.target !== null && onShow(this.target));
+    this.element = el(
+      "section",
+      { class: "card guidance", attributes: { "aria-labelledby": "guidance-title" } },
+      el("h2", { id: "guidance-title", text: "guidanceTitle" }),
+      el("div", { attributes: { "aria-live": "polite" } }, this.next, this.why),
+      this.how,
+      el("div", { class: "goal" }, this.count, this.bar, this.toleranceField()),
+    );
+    model.on(["features", "state"], () => this.show());
+    onLanguage(() => this.show());
+    this.show();
+  }
+
+  /** Whether the green arrow is drawn. */
+  arrow(isThere: boolean): void {
+    if (isThere !== this.hasArrow) {
+      this.hasArrow = isThere;
+      this.show();
+    }
+  }
+
+  private show(): void {
+    const asked = this.model.features.filter(isAsked);
+    const { tolerance } = settings;
+    const reached = asked.filter((feature) => need(feature, tolerance) === null);
+    this.target = null;
+    for (const feature of asked) {
+      if (feature.is_locked) continue;
+      const most = this.target === null ? 0 : urgency(this.target, tolerance);
+      if (urgency(feature, tolerance) > most) this.target = feature;
+    }
+    this.bar.max = Math.max(asked.length, 1);
+    this.bar.value = reached.length;
+    write(this.count, t("progressCount", { reached: reached.length, all: asked.length }));
+    this.next.hidden = this.target === null;
+    this.how.hidden = this.target === null;
+    if (this.target === null) {
+      write(this.why, t(asked.length === 0 ? "guidanceNothing" : "guidanceDone"));
+      return;
+    }
+    write(this.next, t("guidanceNext", { feature: title(this.target) }));
+    write(this.why, this.reason(this.target));
+    write(this.how, t(this.hasArrow ? "guidanceArrow" : "guidanceSpread"));
+  }
+
+  private reason(feature: Feature): string {
+    const wanted = need(feature, settings.tolerance);
+    if (wanted === null) return "";
+    if (wanted.kind === "untouched") return t("needUntouched", { kind: t(kindText(feature.kind)) });
+    if (wanted.kind === "unknown") return t("needUnknown", { touches: wanted.touches });
+    return t("needWide", {
+      size: t(wanted.size),
+      u: uncertainty(wanted.u),
+      tolerance: uncertainty(settings.tolerance),
+    });
+  }
+
+  private toleranceField(): HTMLElement {
+    const field = el("input", { id: "tolerance", attributes: { type: "text", inputmode: "decimal", size: "6", autocomplete: "off" } });
+    const fill = (): void => {
+      field.value = decimal(settings.tolerance * 1e3, 4).replace(/0{1,3}$/, "");
+    };
+    fill();
+    onLanguage(fill);
+    field.addEventListener("change", () => {
+      const typed = typedMillimetres(field.value);
+      field.setAttribute("aria-invalid", String(typed === null));
+      if (typed === null) return;
+      keep({ tolerance: typed });
+      fill();
+      this.show();
+      this.onTolerance();
+    });
+    return el("div", { class: "field" }, el("label", { text: "tolerance", attributes: { for: "tolerance" } }), field, el("span", {}, "mm"));
+  }
+}

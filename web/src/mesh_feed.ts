@@ -1,0 +1,34 @@
+/**
+ * Takes the frames of the mesh off the line, in their order, into the store. A frame that is none, or does not continue what is
+ * here, has the line begin anew, which brings the whole state.
+ */
+import { CdrError } from "./cdr";
+import type { Connection } from "./connection";
+import { decodeMeshPatch } from "./mesh_patch";
+import { GapError, type MeshStore } from "./mesh_store";
+
+export interface FeedListeners {
+  /** After each patch. */
+  onChange: () => void;
+  /** The first part of a mesh of another session came. */
+  onOther: () => void;
+  /** The line begins anew. */
+  onGap: () => void;
+}
+
+export function feedMesh(connection: Connection, store: MeshStore, { onChange, onOther, onGap }: FeedListeners): void {
+  connection.onBytes = (frame) => {
+    const { session } = store;
+    try {
+      store.apply(decodeMeshPatch(frame));
+    } catch (error) {
+      if (!(error instanceof CdrError || error instanceof GapError)) throw error;
+      console.warn(`mesh: ${error.message}`);
+      onGap();
+      connection.renew();
+      return;
+    }
+    if (store.session !== session) onOther();
+    onChange();
+  };
+}

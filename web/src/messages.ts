@@ -1,0 +1,182 @@
+/**
+ * What comes over the wire as JSON, as far as the page reads it. Names and units are those of `msg/` and docs/ros.md: m, rad, N, s.
+ * What is not known is null (NaN has no place in JSON).
+ */
+
+export type Num = number | null;
+
+export interface Xyz {
+  x: Num;
+  y: Num;
+  z: Num;
+}
+
+/** Topic `state`: the page's own. */
+export interface State {
+  role: "look" | "operate";
+  program: string;
+  session: string;
+  is_paused: boolean;
+  scan: { file: string; faces: number };
+  arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts" };
+  clients: number;
+}
+
+export const Kind = {
+  unknown: 0, hole: 1, slot: 2, pocket: 3, boss: 4, edge: 5, corner: 6, plane: 7, cylinder: 8, notch: 9,
+} as const;
+export const Status = { flagged: 1, found: 2, probed: 3 } as const;
+export const FittedTo = { nothing: 0, mesh: 1, touches: 2 } as const;
+
+export type Mark = "" | "accepted" | "rejected";
+
+export interface FormDeviation {
+  characteristic: number;
+  zone: Num;
+  zone_std: Num;
+  least_squares: Num;
+  coverage: Num;
+  undulations: number;
+  lobes: number[];
+}
+
+export interface Feature {
+  id: number;
+  kind: number;
+  status: number;
+  fitted_to: number;
+  touched: Num;
+  touch_count: number;
+  search_radius: Num;
+  center: Xyz;
+  center_std: Num;
+  axis: Xyz;
+  axis_std: Num;
+  direction: Xyz;
+  diameter: Num;
+  diameter_std: Num;
+  length: Num;
+  length_std: Num;
+  width: Num;
+  width_std: Num;
+  depth: Num;
+  depth_std: Num;
+  depth_is_at_least: boolean;
+  cone_angle: Num;
+  cone_angle_std: Num;
+  through: number;
+  convex: number;
+  group: number;
+  points: Xyz[];
+  form: FormDeviation[];
+  /** What somebody said of it; absent where the node keeps none of that. */
+  name?: string;
+  mark?: Mark;
+  is_locked?: boolean;
+}
+
+export interface Relation {
+  kind: number;
+  of_feature: number;
+  to_feature: number;
+  zone: Num;
+  zone_std: Num;
+  angle: Num;
+  angle_std: Num;
+  distance: Num;
+  distance_std: Num;
+  concentricity: Num;
+  concentricity_std: Num;
+}
+
+export interface FeatureArray {
+  session: string;
+  mesh_version: number;
+  features: Feature[];
+  relations: Relation[];
+  unexplained: Num;
+}
+
+export interface Marker {
+  ns: string;
+  id: number;
+  type: number;
+  action: number;
+  pose: { position: Xyz };
+  scale: Xyz;
+  points: Xyz[];
+  text: string;
+}
+
+export interface Mismatch {
+  tip: Xyz;
+  actual_force: Xyz;
+  signed_distance: Num;
+}
+
+export interface DiagnosticStatus {
+  /** 0 good, 1 warning, 2 error, 3 nothing comes. */
+  level: number;
+  name: string;
+  message: string;
+  values: Array<{ key: string; value: string }>;
+}
+
+export interface ProbeResult {
+  id: number;
+  code: number;
+  message: string;
+  touch_count: number;
+  max_force: Num;
+  duration: Num;
+}
+
+/** Codes of `ProbeResult` from which on the arm stands until somebody has looked. */
+export const STOPPED_FROM = 40;
+export const PLANNED = 4;
+
+export interface ProbeTouch {
+  id: number;
+  index: number;
+  verdict: number;
+  accepted: boolean;
+  reason: string;
+  curve_time: Num[];
+  curve_travel: Num[];
+  curve_force: Num[];
+  curve_lateral_force: Num[];
+}
+
+export interface Session {
+  name: string;
+  is_current: boolean;
+  bytes: number;
+  files: string[];
+  begun: string;
+}
+
+/** Message of each topic. */
+export interface Topics {
+  state: State;
+  features: FeatureArray;
+  tip: { markers: Marker[] };
+  mismatch: Mismatch;
+  diagnostics: { status: DiagnosticStatus[] };
+  path: { poses: Array<{ pose: { position: Xyz } }> };
+  probe_results: ProbeResult;
+  probe_touches: ProbeTouch;
+}
+
+export type TopicName = keyof Topics;
+
+/** Answer of most services. */
+export interface Answer {
+  success: boolean;
+  message: string;
+}
+
+/** As three numbers, or null where one of them is not known. */
+export function triple(at: Xyz | undefined): [number, number, number] | null {
+  if (at === undefined || at.x === null || at.y === null || at.z === null) return null;
+  return [at.x, at.y, at.z];
+}

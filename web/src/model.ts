@@ -1,0 +1,80 @@
+/**
+ * What the page knows: the newest message of each topic, and what the operator has chosen. Whoever shows some of it is told when it
+ * changes.
+ */
+import type { Connection, LineState } from "./connection";
+import type { DiagnosticStatus, Feature, ProbeResult, ProbeTouch, Relation, State } from "./messages";
+
+/** What changed. */
+export type Part = "state" | "line" | "features" | "diagnostics" | "selected" | "touches" | "result";
+
+/** Touches of one feature that are remembered. */
+const MOST_TOUCHES = 200;
+
+export class Model {
+  state: State | null = null;
+  line: LineState = { kind: "connecting" };
+  features: Feature[] = [];
+  relations: Relation[] = [];
+  /** The first status: whether what comes is used. */
+  input: DiagnosticStatus | null = null;
+  /** By the number of the feature. */
+  readonly touches = new Map<number, ProbeTouch[]>();
+  result: ProbeResult | null = null;
+  selected: number | null = null;
+  private readonly listeners: Array<[Part[], () => void]> = [];
+
+  constructor(connection: Connection) {
+    connection.onState((line) => this.set("line", () => (this.line = line)));
+    connection.on("state", (state) => this.set("state", () => this.takeState(state)));
+    connection.on("features", (message) =>
+      this.set("features", () => {
+        this.features = message.features;
+        this.relations = message.relations ?? [];
+      }),
+    );
+    connection.on("diagnostics", (message) => this.set("diagnostics", () => (this.input = message.status[0] ?? null)));
+    connection.on("probe_results", (result) => this.set("result", () => (this.result = result)));
+    connection.on("probe_touches", (touch) => this.set("touches", () => this.takeTouch(touch)));
+  }
+
+  on(parts: Part[], listener: () => void): void {
+    this.listeners.push([parts, listener]);
+  }
+
+  feature(id: number | null): Feature | undefined {
+    return this.features.find((feature) => feature.id === id);
+  }
+
+  select(id: number | null): void {
+    if (id !== this.selected) this.set("selected", () => (this.selected = id));
+  }
+
+  get isConnected(): boolean {
+    return this.line.kind === "connected";
+  }
+
+  /** Whether calls may be made here now. */
+  get mayOperate(): boolean {
+    return this.isConnected && this.state?.role === "operate";
+  }
+
+  private takeState(state: State): void {
+    if (this.state !== null && this.state.session !== state.session) {
+      this.touches.clear();
+      this.result = null;
+      this.selected = null;
+    }
+    this.state = state;
+  }
+
+  private takeTouch(touch: ProbeTouch): void {
+    const known = touch.index === 0 ? [] : (this.touches.get(touch.id) ?? []);
+    this.touches.set(touch.id, [...known, touch].slice(-MOST_TOUCHES));
+  }
+
+  private set(part: Part, change: () => void): void {
+    change();
+    for (const [parts, listener] of this.listeners) if (parts.includes(part)) listener();
+  }
+}

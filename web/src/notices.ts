@@ -1,0 +1,42 @@
+/**
+ * Short notices at the edge of the picture: what was done, and what went wrong with the node's own sentence. Read aloud by a
+ * screen reader.
+ */
+import { CallError } from "./connection";
+import { el } from "./dom";
+import { t } from "./language";
+
+/** How long a notice stays, ms; one about an error stays longer. */
+const STAYS = { good: 4000, bad: 12_000 };
+/** More at once nobody reads. */
+const MOST = 3;
+
+export class Notices {
+  readonly element = el("div", { class: "notices", attributes: { role: "status", "aria-live": "polite" } });
+
+  good(words: string): void {
+    this.tell(words, "good");
+  }
+
+  bad(words: string): void {
+    this.tell(words, "bad");
+  }
+
+  failed(error: unknown): void {
+    if (!(error instanceof CallError)) {
+      console.error(error);
+      return this.bad(t("failedFault"));
+    }
+    const plain = { refused: t("failedRefused"), lost: t("failedLost"), late: t("failedLate") }[error.reason];
+    this.bad(error.sentence === null ? plain : `${plain} ${error.sentence}`);
+  }
+
+  private tell(words: string, kind: keyof typeof STAYS): void {
+    const close = el("button", { class: "button ghost small", label: "close", attributes: { type: "button" } }, "×");
+    const notice = el("div", { class: `notice ${kind}` }, el("span", {}, words), close);
+    close.addEventListener("click", () => notice.remove());
+    this.element.append(notice);
+    while (this.element.childElementCount > MOST) this.element.firstElementChild?.remove();
+    setTimeout(() => notice.remove(), STAYS[kind]);
+  }
+}

@@ -1,0 +1,44 @@
+/**
+ * What the page remembers on this device: language, theme, colours, tolerance. Where the browser forbids it, it forgets.
+ */
+
+const KEY = "touchup";
+
+export interface Settings {
+  language: string;
+  theme: "auto" | "light" | "dark";
+  colourBy: string;
+  /** Wanted expanded uncertainty, m. */
+  tolerance: number;
+  showsAll: boolean;
+}
+
+const DEFAULTS: Settings = { language: "", theme: "auto", colourBy: "support", tolerance: 0.02e-3, showsAll: false };
+
+export const settings: Settings = read();
+
+export function keep(changed: Partial<Settings>): void {
+  Object.assign(settings, changed);
+  try {
+    localStorage.setItem(KEY, JSON.stringify(settings));
+  } catch {
+    // forbidden: then it lasts as long as the page
+  }
+}
+
+/** What was kept, each thing only where it has the type of its default. */
+function read(): Settings {
+  let kept: unknown = null;
+  try {
+    kept = JSON.parse(localStorage.getItem(KEY) ?? "null");
+  } catch {
+    // forbidden, or not ours
+  }
+  const found: Record<string, unknown> = { ...DEFAULTS };
+  if (typeof kept === "object" && kept !== null) {
+    for (const [name, value] of Object.entries(kept)) {
+      if (name in found && typeof value === typeof found[name]) found[name] = value;
+    }
+  }
+  return found as unknown as Settings;
+}
