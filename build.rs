@@ -1,8 +1,12 @@
 //! What is made before the program is compiled: the messages of ROS, from the files that define them; and with feature `ur` the
-//! place of the Python that the program was built for, so that the loader finds it also where there are two.
+//! place of the Python that the program was built for, so that the loader finds it also where there are two; with feature `web` the
+//! operator's page.
 
 #[path = "generate/definition.rs"]
 mod definition;
+#[cfg(feature = "web")]
+#[path = "generate/page.rs"]
+mod page;
 #[path = "generate/rust.rs"]
 mod rust;
 
@@ -34,6 +38,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     write("carried.rs", rust::carried(&messages))?;
     write("conversions.rs", rust::conversions(&messages))?;
     write("stand_ins.rs", rust::stand_ins(&messages))?;
+    #[cfg(feature = "web")]
+    write("page.rs", page::build(Path::new("web"), Path::new(&made))?)?;
     Ok(())
 }
 

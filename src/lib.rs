@@ -37,10 +37,11 @@ pub mod ros2_control;
 pub mod ur;
 
 /// The features that the program can be built with, and whether it was.
-pub const FEATURES: [(&str, bool); 3] = [
+pub const FEATURES: [(&str, bool); 4] = [
     ("feature ros", cfg!(feature = "ros")),
     ("feature r2r", cfg!(feature = "r2r")),
     ("feature ur", cfg!(feature = "ur")),
+    ("feature web", cfg!(feature = "web")),
 ];
 
 // the model of a UR's controller is that of the stand-in, which uses this crate by its name

@@ -12,15 +12,25 @@ use super::arm::RobotName;
 use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
 use super::found::FoundTable;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::page::on_page;
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Simulated, write_simulation};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::web::WebFlags;
 use super::{CliError, Losses, print_result, reported, write_json};
 use crate::compare::TouchedRegion;
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::io::recording::StampSource;
 use crate::io::recording::Topics;
 use crate::mesh::{FaceTree, MeshError, TriMesh};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::replay::Recording;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality, plan_demo};
 
 /// Largest distance of the written plate's round walls from circles, m.
@@ -38,6 +48,9 @@ pub(super) struct DemoArguments {
     /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png, touches.png)
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[command(flatten)]
+    web: WebFlags,
 }
 
 /// What `summary.json` holds; lengths in mm.
@@ -66,6 +79,23 @@ reported! {
     }
 }
 
+/// The touching as an operator sees it, live on the page.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+fn demo_on_page(web: &WebFlags, out: &std::path::Path, tip_radius: f64) -> Result<Losses, CliError> {
+    let word = |path: PathBuf| ParameterValue::String(path.display().to_string());
+    let mut parameters = Parameters::default();
+    let settings = [
+        ("scan", word(out.join("scan.ply"))),
+        ("tip_radius_mm", ParameterValue::Double(tip_radius * 1e3)),
+        ("session_folder", word(out.join("sessions"))),
+    ];
+    for (name, value) in settings {
+        parameters.set(name, &value).map_err(CliError::usage)?;
+    }
+    let recording = Recording::open(&out.join("touch.mcap"), &Topics::default(), StampSource::Header)?;
+    on_page(web, parameters, recording)
+}
+
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     match arguments.robot {
         None => {}
@@ -80,6 +110,10 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &stylus, None, &arguments.out)?;
 
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    if arguments.web.is_wanted() {
+        return demo_on_page(&arguments.web, out, stylus.radius);
+    }
     let (scan_file, recording) = (out.join("scan.ply"), out.join("touch.mcap"));
     let mut files = RefineArguments::in_folder(scan_file, unit, recording, out, None, Topics::default());
     files.told.tip_radius_mm = Some(stylus.radius * 1e3);

@@ -223,6 +223,14 @@ errors_of_rooms! {
     }, "";
 }
 
+#[cfg(feature = "web")]
+errors_of_rooms! {
+    crate::ros::web::WebError => |error| match error {
+        crate::ros::web::WebError::Certificate { .. } => ("web", 3),
+        _ => ("web", 1),
+    }, "";
+}
+
 #[cfg(feature = "ur")]
 errors_of_rooms! {
     crate::ur::SetupError => |_| ("arm", 1), "";

@@ -21,6 +21,8 @@ mod init;
 mod node;
 mod offsets;
 mod output;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod page;
 mod pictures;
 mod probe;
 mod probing;
@@ -38,6 +40,8 @@ mod step;
 mod told;
 #[cfg(feature = "ur")]
 mod ur;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod web;
 
 use error::{CliError, Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{

@@ -8,6 +8,7 @@ use clap::Args;
 use super::arm::{connect_ur, ros2_control_arm};
 use super::signals::{SignalKind, on_each_signal};
 use super::told::{ToldBy, ToldNumbers};
+use super::web::WebFlags;
 use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
 use crate::live::Quantiles;
@@ -28,6 +29,8 @@ pub(super) struct NodeArguments {
     /// Radius of the ball, mm; needed where no scene names it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     tip_radius_mm: Option<f64>,
+    #[command(flatten)]
+    web: WebFlags,
     /// Prints the report of the session as one JSON object
     #[arg(long)]
     json: bool,
@@ -51,7 +54,8 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
-    let port = ros::start(&config, inbox)?;
+    let port = ros::start(&config, inbox.clone())?;
+    let (port, _page) = arguments.web.serve(&ready, inbox, port)?;
     let arm = arm_of(&config, ready.scene())?;
     let running = ready.start(port, arrivals, arm)?;
     let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();

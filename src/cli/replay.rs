@@ -11,13 +11,14 @@ use serde::Serialize;
 use super::progress::WorkProgress;
 use super::{CliError, Losses, counted, notify, print_report};
 use crate::io::recording::{StampSource, Topics};
-use crate::replay::{Recording, each_message, marker_filter};
+use crate::replay::{Recording, Replayed, each_message, marker_filter};
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::node::{CELL, as_pose, as_wrench};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::SamplePort;
 use crate::scene::Scene;
+use crate::stylus::MarkerFilter;
 use crate::stylus::{Message, SyncParams, WrenchFrame};
 
 /// Wait after discovery of the subscribers: whether they have discovered us in turn they do not announce.
@@ -66,7 +67,7 @@ fn speed(text: &str) -> Result<f64, String> {
 
 /// What `--json` prints.
 #[derive(Debug, Default, Serialize)]
-struct Played {
+pub(super) struct Played {
     wrenches: u64,
     poses: u64,
     /// that the network did not take
@@ -87,11 +88,40 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 
+    let (played, replayed) = play(recording, markers, arguments.speed, &arguments.source, &*port)?;
+    let listeners = port.listeners();
+    sleep(LINGER);
+
+    let mut losses = replayed.losses;
+    if played.unsent > 0 {
+        losses.push(format!("{} not taken by the network", counted(played.unsent, "message", "messages")));
+    }
+    if listeners.contains(&0) {
+        losses.push("a subscriber left before the end".to_owned());
+    }
+    print_report(arguments.json, &played, || {
+        let wrenches = counted(played.wrenches, "wrench", "wrenches");
+        let poses = counted(played.poses, "pose", "poses");
+        format!("played {wrenches} and {poses} in {:.1} s", played.played_s)
+    })?;
+    Ok(losses)
+}
+
+/// Plays a recording in real time, each stream in the order of its stamps; what was played, and what of the recording was lost.
+///
+/// - `source`: who touches, `stylus` or `probe`: its sensor gives the wrenches their frame.
+pub(super) fn play(
+    recording: Recording,
+    markers: Option<MarkerFilter>,
+    speed: f64,
+    source: &str,
+    port: &dyn SamplePort,
+) -> Result<(Played, Replayed), CliError> {
     let wrench_frame = match recording.wrench_frame {
         WrenchFrame::Object => CELL.to_owned(),
-        WrenchFrame::Sensor => format!("{}_sensor", arguments.source),
+        WrenchFrame::Sensor => format!("{source}_sensor"),
     };
-    let (mut played, mut pace, began) = (Played::default(), ReplayPace::new(arguments.speed), Instant::now());
+    let (mut played, mut pace, began) = (Played::default(), ReplayPace::new(speed), Instant::now());
     let mut publish = |message: Message| {
         pace.wait_for(message.stamp_ns());
         let is_sent = match &message {
@@ -112,22 +142,7 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
         each_message(recording, markers, &mut || progress.step(), |message| order.push(message, &mut publish))?;
     order.finish(&mut publish);
     played.played_s = began.elapsed().as_secs_f64();
-    let listeners = port.listeners();
-    sleep(LINGER);
-
-    let mut losses = replayed.losses;
-    if played.unsent > 0 {
-        losses.push(format!("{} not taken by the network", counted(played.unsent, "message", "messages")));
-    }
-    if listeners.contains(&0) {
-        losses.push("a subscriber left before the end".to_owned());
-    }
-    print_report(arguments.json, &played, || {
-        let wrenches = counted(played.wrenches, "wrench", "wrenches");
-        let poses = counted(played.poses, "pose", "poses");
-        format!("played {wrenches} and {poses} in {:.1} s", played.played_s)
-    })?;
-    Ok(losses)
+    Ok((played, replayed))
 }
 
 /// Waits for subscribers: the beginning of a recording must not be lost either.

@@ -10,7 +10,7 @@ use super::arguments::NodeConfig;
 use super::clock::RosClock;
 use super::inbox::Inbox;
 use super::names::NameError;
-use super::port::{Arrival, Call, Port, Publication, Reply};
+use super::port::{Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
 
 /// Why the node cannot speak to others.
@@ -61,11 +61,6 @@ impl Exchange {
             mesh: SendQueue::default(),
             lost: Default::default(),
         })
-    }
-
-    /// A service or the action was called.
-    pub fn call(&self, call: Call) {
-        self.inbox.put(Arrival::Call(call));
     }
 
     /// An answer that goes out from the thread that sends.

@@ -19,6 +19,8 @@ const MOST_KEPT: usize = 1 << 16;
 #[derive(Debug)]
 struct InProcess {
     published: Mutex<VecDeque<Publication>>,
+    /// publications that are kept at most
+    most_kept: usize,
     clock: Clock,
     /// the time of ROS, ns, and when it was that
     now_ns: Mutex<(i64, Instant)>,
@@ -28,8 +30,11 @@ struct InProcess {
 
 impl Port for InProcess {
     fn publish(&self, publication: Publication) {
+        if self.most_kept == 0 {
+            return;
+        }
         let mut published = locked(&self.published);
-        if published.len() == MOST_KEPT {
+        if published.len() == self.most_kept {
             published.pop_front();
             self.unsent.fetch_add(1, Ordering::Relaxed);
         }
@@ -75,8 +80,18 @@ pub struct OtherParticipants {
 /// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
 /// `clock`.
 pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
+    start_keeping(MOST_KEPT, inbox, clock)
+}
+
+/// The same where nobody reads what is published.
+pub fn start_unread(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
+    start_keeping(0, inbox, clock)
+}
+
+fn start_keeping(most_kept: usize, inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
     let port = Arc::new(InProcess {
         published: Mutex::default(),
+        most_kept,
         now_ns: Mutex::new((0, clock.now())),
         clock: clock.clone(),
         inbox,

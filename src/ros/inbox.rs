@@ -91,6 +91,11 @@ impl Inbox {
         self.put_in(arrival, |_, waiting, _| waiting)
     }
 
+    /// A service or the action was called.
+    pub fn call(&self, call: Call) {
+        self.put(Arrival::Call(call));
+    }
+
     /// As [`Self::put`], as soon as there is room. Whether the node still takes anything.
     pub fn put_patiently(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |shared, waiting, kind| {

@@ -22,6 +22,8 @@ mod send_queue;
 mod services;
 pub mod stop;
 mod topics;
+#[cfg(feature = "web")]
+pub mod web;
 
 #[cfg(all(feature = "ros", any(not(feature = "r2r"), feature = "r2r-check")))]
 pub use dds::{arm_port, samples, start};

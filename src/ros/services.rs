@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::exchange::{Exchange, RosError};
+use super::exchange::RosError;
+use super::inbox::Inbox;
 use super::messages::*;
 use super::port::{ArmOrder, Call, Reply};
 
@@ -39,7 +40,7 @@ pub(super) use services;
 
 services! {
     /// Offers those whose requests go to the inbox of the node, and those that stop its arm at once.
-    fn serve(Exchange);
+    fn serve(Inbox);
     "~/flag_feature": FlagFeature, |to, request, reply| to.call(Call::Flag(request, reply));
     "~/unflag_feature": UnflagFeature, |to, request, reply| to.call(Call::Unflag(request, reply));
     "~/detect_features": DetectFeatures, |to, request, reply| to.call(Call::Detect(request, reply));
@@ -48,8 +49,8 @@ services! {
     "~/undo": Undo, |to, request, reply| to.call(Call::Undo(request, reply));
     "~/redo": Undo, |to, request, reply| to.call(Call::Redo(request, reply));
     "~/reset": Trigger, |to, _, reply| to.call(Call::Reset(reply));
-    "~/pause": SetBool, |to, request, reply| reply.send(to.inbox.stops().pause(request.data));
-    "~/stop": Trigger, |to, _, reply| reply.send(to.inbox.stops().stop());
+    "~/pause": SetBool, |to, request, reply| reply.send(to.stops().pause(request.data));
+    "~/stop": Trigger, |to, _, reply| reply.send(to.stops().stop());
     "~/probe_all": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::All(reply)));
     "~/recover": Trigger, |to, _, reply| to.call(Call::Arm(ArmOrder::Recover(reply)));
     "~/arm_state": Trigger, |to, _, reply| to.call(Call::ArmState(reply));
@@ -66,7 +67,6 @@ mod tests {
 
     use super::*;
     use crate::clock::Clock;
-    use crate::ros::arguments::NodeConfig;
     use crate::ros::inbox::inbox;
     use crate::ros::port::Arrival;
 
@@ -90,12 +90,10 @@ mod tests {
 
     #[test]
     fn a_stop_is_answered_on_the_thread_that_hears_it_though_no_sample_finds_room() {
-        let config = NodeConfig::new(&[], |_| None).unwrap();
         let (inbox, _arrivals) = inbox(1, &Clock::system());
         while inbox.put(Arrival::Viewer) {}
-        let exchange = Exchange::new(&config, inbox.clone());
         let mut calls = CallsStops(Vec::new());
-        serve(&mut calls, &exchange).unwrap();
+        serve(&mut calls, &Arc::new(inbox.clone())).unwrap();
         let CallsStops(answers) = calls;
         assert!(answers.len() == 2 && answers[0].contains("samples are taken"), "{answers:?}");
         assert!(answers[1].contains("no arm configured") && inbox.stops().request().is_some(), "{answers:?}");

@@ -23,8 +23,12 @@ pub const NO_ARM: &str = "no arm configured: start the node with robot:=sim or r
 /// What is left where the arm's thread does not stop it.
 const BY_HAND: &str = "if the arm moves, press its emergency stop";
 
+/// A button that is held for the arm to move beats 20 times a second: after a silence this long the arm stops and stays.
+pub const LONGEST_BEAT: Duration = Duration::from_millis(150);
+
 /// What the arm does now.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Motion {
     /// Nothing moves it.
     #[default]
@@ -58,6 +62,10 @@ struct Stops {
     is_recovery_asked: bool,
     motion: Motion,
     thread: ArmThread,
+    /// the last beat of a button that is held, when one has come
+    beat: Option<Instant>,
+    /// orders for which a button has to be held
+    held_orders: u32,
 }
 
 impl Stops {
@@ -73,6 +81,10 @@ impl Stops {
 
     fn stay(&mut self, why: &'static str) {
         (self.stay, self.is_recovery_asked) = (Some(why), false);
+    }
+
+    fn is_held(&self, clock: &Clock) -> bool {
+        self.beat.is_some_and(|beat| clock.since(beat) <= LONGEST_BEAT)
     }
 
     /// Why nobody hears a request, where nobody does.
@@ -109,6 +121,8 @@ impl StopState {
             is_recovery_asked: false,
             motion: Motion::Rests,
             thread: ArmThread::None,
+            beat: None,
+            held_orders: 0,
         };
         Self { clock, stops: Mutex::new(stops) }
     }
@@ -166,6 +180,38 @@ impl StopState {
             }
         }
         Ok(())
+    }
+
+    /// A beat of the button that is held.
+    pub fn beat(&self) {
+        let now = self.clock.now();
+        locked(&self.stops).beat = Some(now);
+    }
+
+    /// From here on the arm moves only while the button is held: after a longer silence than [`LONGEST_BEAT`] it stops and stays, until
+    /// `~/recover`.
+    ///
+    /// # Errors
+    /// In words, where the button is not held.
+    pub fn hold_to_run(&self) -> Result<(), String> {
+        let mut stops = locked(&self.stops);
+        if !stops.is_held(&self.clock) {
+            return Err("the arm moves only while the button is held: hold it, then send the order".to_owned());
+        }
+        stops.held_orders += 1;
+        Ok(())
+    }
+
+    /// An order for which the button was held is answered.
+    pub fn end_hold(&self) {
+        let mut stops = locked(&self.stops);
+        stops.held_orders = stops.held_orders.saturating_sub(1);
+    }
+
+    /// What is known of the arm: whether it may move, what it does, and why it stays where it is; `None` where there is none.
+    pub fn arm(&self) -> Option<(bool, Motion, Option<&'static str>)> {
+        let stops = locked(&self.stops);
+        (!matches!(stops.thread, ArmThread::None)).then_some((stops.may_move, stops.motion, stops.stay))
     }
 
     /// The node is to end: what moves stops and retracts; asked for again, it stops and stays. Whether that is new: `false` when
@@ -235,7 +281,11 @@ impl StopState {
 
     /// How the arm is to stop, where it is.
     pub fn request(&self) -> Option<StopRequest> {
-        locked(&self.stops).request()
+        let mut stops = locked(&self.stops);
+        if stops.held_orders > 0 && !stops.is_held(&self.clock) {
+            stops.stay("the button was let go, or its page was lost");
+        }
+        stops.request()
     }
 
     /// Why the arm is to stop in this way, where it is: a code of [`ProbeResult`], and in words.
@@ -301,6 +351,40 @@ mod tests {
         state.end_arm("at its end");
         state.end_arm("later");
         assert!(state.stop().message.contains("has ended, at its end"), "{}", state.stop().message);
+    }
+
+    #[test]
+    fn an_arm_that_is_held_to_run_stays_as_soon_as_the_beats_end_and_until_it_is_recovered() {
+        let (clock, hand) = Clock::manual();
+        let state = StopState::new(clock);
+        assert!(state.hold_to_run().unwrap_err().contains("while the button is held"));
+        state.beat();
+        state.hold_to_run().unwrap();
+        for _ in 0..100 {
+            hand.advance(Duration::from_millis(50));
+            state.beat();
+            assert_eq!(state.request(), None);
+        }
+        hand.advance(LONGEST_BEAT);
+        assert_eq!(state.request(), None);
+        hand.advance(Duration::from_millis(1));
+        assert_eq!(state.request(), Some(StopRequest::Stay));
+        state.beat();
+        assert_eq!(state.request(), Some(StopRequest::Stay), "a late beat moves nothing");
+        state.end_hold();
+        state.ask_recovery();
+        state.recover().unwrap();
+        state.hold_to_run().unwrap();
+        state.hold_to_run().unwrap();
+        // a second order that is refused ends its own hold alone
+        state.end_hold();
+        hand.advance(LONGEST_BEAT * 2);
+        assert_eq!(state.request(), Some(StopRequest::Stay));
+        state.end_hold();
+        state.ask_recovery();
+        state.recover().unwrap();
+        hand.advance(Duration::from_secs(10));
+        assert_eq!(state.request(), None, "nobody has to hold it any more");
     }
 
     #[test]

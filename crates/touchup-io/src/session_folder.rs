@@ -74,11 +74,7 @@ impl SessionFolder {
     /// # Errors
     /// [`PlaceError`] for whatever could lead out of the folder, and for a file that is there unless it may be replaced.
     pub fn place(&self, name: &str, may_replace: bool) -> Result<PathBuf, PlaceError> {
-        let mut parts = Path::new(name).components();
-        let is_plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
-            && !name.starts_with('.')
-            && !name.chars().any(|c| c.is_control() || c == '\\');
-        if !is_plain {
+        if !is_plain_name(name) {
             return Err(PlaceError::NotAPlainName(name.to_owned()));
         }
         let path = self.path.join(name);
@@ -94,7 +90,7 @@ impl SessionFolder {
     /// # Errors
     /// Whatever the system reports.
     pub fn write_text(&self, name: &str, text: &str) -> io::Result<()> {
-        write_atomically(&self.path.join(name), |out| out.write_all(text.as_bytes()))
+        write_text_file(&self.path.join(name), text)
     }
 
     /// Adds a line to a file, and has it on the disk.
@@ -106,6 +102,89 @@ impl SessionFolder {
         file.write_all(format!("{line}\n").as_bytes())?;
         file.sync_data()
     }
+}
+
+/// A session that lies in a folder of sessions.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ListedSession {
+    /// of its folder
+    pub name: String,
+    /// of all its files
+    pub bytes: u64,
+    /// names of its files, in their order
+    pub files: Vec<String>,
+}
+
+/// Sessions in a list at most: the last by name, which are the newest.
+const MOST_LISTED: usize = 1000;
+
+/// The sessions in a folder, the newest first; links and what has a name of another form are left out.
+///
+/// # Errors
+/// Whatever the system reports.
+pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(parent)? {
+        let entry = entry?;
+        let name = entry.file_name().into_string().unwrap_or_default();
+        if entry.file_type()?.is_dir() && is_plain_name(&name) {
+            names.push(name);
+        }
+    }
+    names.sort();
+    names.reverse();
+    names.truncate(MOST_LISTED);
+    names.into_iter().map(|name| listed(parent, name)).collect()
+}
+
+fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
+    let mut session = ListedSession { name, bytes: 0, files: Vec::new() };
+    for entry in fs::read_dir(parent.join(&session.name))? {
+        let entry = entry?;
+        let file = entry.file_name().into_string().unwrap_or_default();
+        let about = entry.metadata()?;
+        if about.is_file() && is_plain_name(&file) {
+            session.bytes += about.len();
+            session.files.push(file);
+        }
+    }
+    session.files.sort();
+    Ok(session)
+}
+
+/// A file of a session that somebody else named, and its length.
+///
+/// # Errors
+/// Whatever the system reports, and names that could lead elsewhere.
+pub fn open_file(parent: &Path, session: &str, file: &str) -> io::Result<(File, u64)> {
+    if !is_plain_name(session) || !is_plain_name(file) {
+        return Err(io::Error::new(io::ErrorKind::NotFound, "this is not the name of a file of a session"));
+    }
+    let folder = parent.join(session);
+    let path = folder.join(file);
+    // a link may lead anywhere
+    if !fs::symlink_metadata(&folder)?.is_dir() || !fs::symlink_metadata(&path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::NotFound, "this is no plain file of a session"));
+    }
+    let opened = File::open(path)?;
+    let length = opened.metadata()?.len();
+    Ok((opened, length))
+}
+
+/// Whether it is the name of one thing in a folder, and of none outside.
+fn is_plain_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
+        && !name.starts_with('.')
+        && !name.chars().any(|c| c.is_control() || c == '\\' || c == '"')
+}
+
+/// Writes a text file as a whole.
+///
+/// # Errors
+/// Whatever the system reports.
+pub fn write_text_file(path: &Path, text: &str) -> io::Result<()> {
+    write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// The text of a file that is not absurdly long; empty where there is none.

@@ -140,7 +140,7 @@ impl ProbeAction {
             result: Reply::new(move |(end, response)| for_result.end(id, end, response)),
             is_cancelled,
         };
-        self.exchange.call(Call::Arm(ArmOrder::Goal(request.goal, goal)));
+        self.exchange.inbox.call(Call::Arm(ArmOrder::Goal(request.goal, goal)));
     }
 
     fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {

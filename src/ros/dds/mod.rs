@@ -95,7 +95,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     };
     let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
     subscribe(config, &mut back_end)?;
-    super::services::serve(&mut back_end, &exchange)?;
+    super::services::serve(&mut back_end, &Arc::new(exchange.inbox.clone()))?;
     back_end.graph.services = back_end.names.clone();
     let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
     let announce = announcing.clone();

@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use super::arm::{self, ArmOfNode};
 use super::error::NodeError;
 use super::feature_worker::FeatureWorker;
+use super::mesh_patches::MeshPatches;
 use super::refinement::RefinementWorker;
 use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
@@ -16,6 +17,7 @@ use super::side_work::begin;
 use super::view::View;
 use crate::clock::Clock;
 use crate::ros::inbox::Arrivals;
+use crate::ros::messages::MeshPatch;
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
@@ -73,6 +75,13 @@ impl Prepared {
     /// The scan: where it was read from, and how many faces it has.
     pub fn scan(&self) -> (&Path, usize) {
         (&self.setup.scan_path, self.setup.scan.0.face_count())
+    }
+
+    /// The mesh before anything was touched, in parts: what a follower has that is there from the beginning.
+    pub fn whole_mesh(&self) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
+        let shared = &self.setup.shared;
+        let (replica, _) = shared.mesh.now();
+        MeshPatches::of(&replica, shared.scan_sigma).whole(replica, shared.frame.clone())
     }
 
     /// The scene as it was read.

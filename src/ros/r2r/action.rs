@@ -52,7 +52,7 @@ pub(super) fn server(node: &mut Node, exchange: &Arc<Exchange>) -> Result<[PollS
     let exchange = exchange.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
         let wanted = ProbeGoal::ours(request.goal.clone());
-        exchange.call(Call::Arm(ArmOrder::Goal(wanted, goal(request, &exchange, &running))));
+        exchange.inbox.call(Call::Arm(ArmOrder::Goal(wanted, goal(request, &exchange, &running))));
     });
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }

@@ -69,7 +69,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
     subscribe(config, &mut back_end)?;
     let announce = announce(&mut back_end.node, config.place.full_name(), &exchange)?;
-    super::services::serve(&mut back_end, &exchange)?;
+    super::services::serve(&mut back_end, &Arc::new(exchange.inbox.clone()))?;
     parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
     let R2rBackEnd { mut node, graph, mut sources, .. } = back_end;
     sources.extend(action::server(&mut node, &exchange)?);

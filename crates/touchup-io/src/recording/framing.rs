@@ -54,7 +54,7 @@ impl NameBytes {
 
 /// The bytes of a file from front to end, with position and checksum.
 pub(super) struct ByteStream {
-    input: Box<dyn Read>,
+    input: Box<dyn Read + Send>,
     pub at: u64,
     /// Of the file; unknown while it is unpacked in a stream.
     size: Option<u64>,
@@ -66,7 +66,7 @@ impl ByteStream {
     pub fn open(path: &Path, packed: bool) -> std::io::Result<Self> {
         let file = File::open(path)?;
         let size = if packed { None } else { Some(file.metadata()?.len()) };
-        let input: Box<dyn Read> =
+        let input: Box<dyn Read + Send> =
             if packed { Box::new(BufReader::new(zstd::Decoder::new(file)?)) } else { Box::new(BufReader::new(file)) };
         Ok(Self { input, at: 0, size, crc: crc32fast::Hasher::new() })
     }

@@ -167,7 +167,7 @@ struct RawMessage<'a> {
 }
 
 /// One file of a recording: its messages on the two topics, one after another.
-trait RecordingFile {
+trait RecordingFile: Send {
     /// Topics that are known so far.
     fn topics(&self) -> Vec<TopicInfo>;
 

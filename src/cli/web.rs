@@ -1,0 +1,94 @@
+//! `--web`: where the operator's page is served, of every verb that has one.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use clap::Args;
+
+use super::CliError;
+#[cfg(feature = "web")]
+use super::notify;
+#[cfg(not(feature = "web"))]
+use super::require;
+use crate::ros::inbox::Inbox;
+use crate::ros::node::Prepared;
+use crate::ros::port::Port;
+#[cfg(feature = "web")]
+use crate::ros::web::{Certificate, NodeFacts, WebParams, WebServer, start};
+
+/// There is none.
+#[cfg(not(feature = "web"))]
+pub(super) enum WebServer {}
+
+#[cfg(not(feature = "web"))]
+const NOT_BUILT: &str =
+    "this touchup was built without the page: cargo install --locked --path . --features web (needs npm)";
+
+/// Where the page is served.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct WebFlags {
+    /// Serves the operator's page at this address; another one than that of this machine alone lets in who has a link
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8321", value_parser = address)]
+    web: Option<SocketAddr>,
+    /// Name of this machine by which the page may be called, beside its address; can be given again
+    #[arg(long, value_name = "NAME", requires = "web")]
+    web_name: Vec<String>,
+    /// Serves the page by TLS with this certificate chain, PEM
+    #[arg(long, value_name = "PEM", requires_all = ["web", "web_key"])]
+    web_certificate: Option<PathBuf>,
+    /// The key of the certificate, PEM
+    #[arg(long, value_name = "PEM", requires = "web_certificate")]
+    web_key: Option<PathBuf>,
+}
+
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let why = || "it must be an address and a port of this machine, as 192.168.0.7:8321".to_owned();
+    text.to_socket_addrs().map_err(|_| why())?.next().ok_or_else(why)
+}
+
+impl WebFlags {
+    /// Whether a page is wanted.
+    pub fn is_wanted(&self) -> bool {
+        self.web.is_some()
+    }
+
+    /// The port for the node: no page is wanted, or this program has none.
+    #[cfg(not(feature = "web"))]
+    pub fn serve(
+        &self,
+        _: &Prepared,
+        _: Inbox,
+        network: Arc<dyn Port>,
+    ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {
+        require(!self.is_wanted(), NOT_BUILT)?;
+        Ok((network, None))
+    }
+
+    /// Serves the page where it is wanted, and says where: the port for the node.
+    #[cfg(feature = "web")]
+    pub fn serve(
+        &self,
+        ready: &Prepared,
+        inbox: Inbox,
+        network: Arc<dyn Port>,
+    ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {
+        let Some(address) = self.web else { return Ok((network, None)) };
+        let certificate = self.web_certificate.clone().zip(self.web_key.clone());
+        let certificate = certificate.map(|(chain, key)| Certificate { chain, key });
+        let is_open = certificate.is_none() && !address.ip().is_loopback();
+        let (scan, faces) = ready.scan();
+        let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
+        let facts = NodeFacts { scan: scan.to_owned(), faces, session_folder };
+        let params = WebParams { address, names: self.web_name.clone(), certificate };
+        let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;
+        notify(&format!("page: {}", server.url()));
+        server.invitations().iter().for_each(|invitation| notify(invitation));
+        if is_open {
+            notify(
+                "the page is not encrypted: use it in a network of your own, or give --web-certificate and --web-key",
+            );
+        }
+        Ok((port, Some(server)))
+    }
+}

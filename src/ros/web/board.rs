@@ -1,0 +1,166 @@
+//! What the pages are shown: the newest of each topic, and the mesh. The node writes, and each page reads at its own pace.
+
+use std::collections::VecDeque;
+use std::sync::Mutex;
+
+use serde::Serialize;
+use tokio::sync::watch;
+
+use super::mesh_copy::{MeshCopy, PageId};
+use crate::ros::locked;
+use crate::ros::messages::{
+    DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, MeshPatch, Path, ProbeResult, ProbeTouch,
+};
+use crate::ros::port::Publication;
+
+/// Results and touches of an arm that are kept for who joins late; the oldest go first.
+const MOST_KEPT: usize = 1000;
+
+/// The newest message of a topic, and its number among all that were written.
+#[derive(Debug)]
+struct Newest<M>(u64, Option<M>);
+
+impl<M> Default for Newest<M> {
+    fn default() -> Self {
+        Self(0, None)
+    }
+}
+
+impl<M: Serialize> Newest<M> {
+    fn write(&mut self, number: u64, message: M) {
+        *self = Self(number, Some(message));
+    }
+
+    fn read(&self, topic: &str, seen: u64, into: &mut Vec<String>) {
+        if let Self(number, Some(message)) = self
+            && *number > seen
+        {
+            into.extend(text_of(topic, message));
+        }
+    }
+}
+
+/// `{"topic": …, "message": …}`; numbers that are none are `null`.
+pub(super) fn text_of(topic: &str, message: &impl Serialize) -> Option<String> {
+    #[derive(Serialize)]
+    struct Shown<'a, M> {
+        topic: &'a str,
+        message: &'a M,
+    }
+    serde_json::to_string(&Shown { topic, message }).ok()
+}
+
+#[derive(Debug, Default)]
+struct Topics {
+    /// messages written so far
+    written: u64,
+    features: Newest<FeatureArray>,
+    tip: Newest<MarkerArray>,
+    path: Newest<Path>,
+    mismatch: Newest<HapticMismatch>,
+    diagnostics: Newest<DiagnosticArray>,
+    results: VecDeque<(u64, ProbeResult)>,
+    touches: VecDeque<(u64, ProbeTouch)>,
+}
+
+fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
+    if kept.len() == MOST_KEPT {
+        kept.pop_front();
+    }
+    kept.push_back((number, message));
+}
+
+/// Read by all pages.
+#[derive(Debug)]
+pub(super) struct Board {
+    mesh: Mutex<MeshCopy>,
+    topics: Mutex<Topics>,
+    changes: watch::Sender<()>,
+}
+
+impl Board {
+    /// - `whole`: the mesh as the node has it at its start.
+    pub fn new(whole: impl Iterator<Item = MeshPatch>) -> Self {
+        let mut mesh = MeshCopy::default();
+        whole.for_each(|part| mesh.take(part));
+        Self { mesh: Mutex::new(mesh), topics: Mutex::default(), changes: watch::Sender::new(()) }
+    }
+
+    /// Takes up what the node publishes.
+    pub fn write(&self, publication: Publication) {
+        if let Publication::MeshPatch(patch) = publication {
+            locked(&self.mesh).take(patch);
+        } else {
+            let topics = &mut *locked(&self.topics);
+            topics.written += 1;
+            let number = topics.written;
+            match publication {
+                Publication::Features(features) => topics.features.write(number, features),
+                Publication::Tip(tip) => topics.tip.write(number, tip),
+                Publication::Path(path) => topics.path.write(number, path),
+                Publication::Mismatch(mismatch) => topics.mismatch.write(number, mismatch),
+                Publication::Diagnostics(diagnostics) => topics.diagnostics.write(number, diagnostics),
+                Publication::ProbeResult(result) => keep(&mut topics.results, number, result),
+                Publication::ProbeTouch(touch) => keep(&mut topics.touches, number, touch),
+                // the same as mesh patches and features, drawn for RViz
+                Publication::Tile(_) | Publication::FeatureMarkers(_) | Publication::MeshPatch(_) => return,
+            }
+        }
+        self.changes.send_replace(());
+    }
+
+    /// Comes whenever something was written.
+    pub fn changes(&self) -> watch::Receiver<()> {
+        self.changes.subscribe()
+    }
+
+    /// Wakes all pages.
+    pub fn wake(&self) {
+        self.changes.send_replace(());
+    }
+
+    /// Messages on topics that a page has not seen, as text.
+    ///
+    /// - `seen`: how many were written when it last read; set anew.
+    pub fn read(&self, seen: &mut u64) -> Vec<String> {
+        let topics = locked(&self.topics);
+        let mut texts = Vec::new();
+        topics.features.read("features", *seen, &mut texts);
+        topics.tip.read("tip", *seen, &mut texts);
+        topics.path.read("path", *seen, &mut texts);
+        topics.mismatch.read("mismatch", *seen, &mut texts);
+        topics.diagnostics.read("diagnostics", *seen, &mut texts);
+        let touches = topics.touches.iter().filter(|(number, _)| number > seen);
+        texts.extend(touches.filter_map(|(_, touch)| text_of("probe_touches", touch)));
+        let results = topics.results.iter().filter(|(number, _)| number > seen);
+        texts.extend(results.filter_map(|(_, result)| text_of("probe_results", result)));
+        *seen = topics.written;
+        texts
+    }
+
+    /// A feature as it was published last.
+    pub fn feature(&self, id: u32) -> Option<Feature> {
+        let topics = locked(&self.topics);
+        topics.features.1.as_ref()?.features.iter().find(|feature| feature.id == id).cloned()
+    }
+
+    /// A page comes.
+    pub fn join(&self, page: PageId) {
+        locked(&self.mesh).join(page);
+    }
+
+    /// … and goes.
+    pub fn leave(&self, page: PageId) {
+        locked(&self.mesh).leave(page);
+    }
+
+    /// More of the mesh for a page; as [`MeshCopy::next_for`].
+    pub fn mesh_for(&self, page: PageId) -> Option<MeshPatch> {
+        locked(&self.mesh).next_for(page)
+    }
+
+    /// Name of the session.
+    pub fn session(&self) -> String {
+        locked(&self.mesh).session().to_owned()
+    }
+}

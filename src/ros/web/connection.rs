@@ -1,0 +1,221 @@
+//! One page at work: what it is sent, at its own pace, and what it asks.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{Message, WebSocket};
+use byteorder::LittleEndian;
+use futures_util::stream::SplitSink;
+use futures_util::{SinkExt, StreamExt};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::sync::mpsc::{Receiver, Sender, channel};
+use tokio::sync::watch;
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+use super::Site;
+use super::access::Role;
+use super::board::text_of;
+use super::mesh_copy::PageId;
+use crate::ros::messages::MeshPatch;
+use crate::ros::port::Reply;
+
+/// A page is sent something new after so long at the earliest.
+const FRAME: Duration = Duration::from_millis(33);
+/// So often a page hears something; it takes a silence of twice that for a lost connection.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
+/// A page that takes nothing, or from which nothing comes, for so long has gone: it answers each sign of life.
+const GONE_AFTER: Duration = Duration::from_secs(20);
+/// Answers that wait for a page at most.
+const MOST_ANSWERS: usize = 64;
+/// Messages of a page within a second, at most: a beat comes 20 times.
+const MOST_PER_SECOND: u32 = 200;
+/// Kind of a binary message: a `MeshPatch`.
+const MESH_PATCH: u8 = 1;
+
+/// What a page sends.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Asked {
+    /// a call of a service
+    Call {
+        /// by which the page knows the answer
+        id: Value,
+        /// name of the service
+        call: String,
+        #[serde(default)]
+        request: Value,
+    },
+    /// the button is held
+    Beat {
+        /// how often it was sent
+        #[allow(dead_code, reason = "its coming is all that counts")]
+        beat: u64,
+    },
+}
+
+/// Serves a page until it goes.
+pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
+    let page = site.pages_so_far.fetch_add(1, Ordering::Relaxed);
+    site.board.join(page);
+    let (to_page, mut from_page) = socket.split();
+    let (answers, waiting) = channel(MOST_ANSWERS);
+    let sending = send(to_page, Arc::clone(&site), page, role, waiting);
+    let hearing = async {
+        let mut rate = Rate::default();
+        while let Ok(Some(Ok(message))) = timeout(GONE_AFTER, from_page.next()).await {
+            let Message::Text(text) = message else { continue };
+            if !rate.allows(Instant::now()) {
+                tracing::warn!(page, "a page sends too much: it is cut off");
+                break;
+            }
+            hear(&text, &site, role, &answers);
+        }
+    };
+    tokio::select! {
+        () = sending => {}
+        () = hearing => {}
+    }
+    site.board.leave(page);
+    // the others show how many there are
+    site.board.wake();
+}
+
+fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
+    let (id, call, request) = match serde_json::from_str(text) {
+        Ok(Asked::Call { id, call, request }) => (id, call, request),
+        Ok(Asked::Beat { .. }) => {
+            if role == Role::Operate {
+                site.inbox.stops().beat();
+            }
+            return;
+        }
+        Err(error) => {
+            let said = json!({ "id": null, "error": format!("this is no call: {error}") });
+            return drop(answers.try_send(said.to_string()));
+        }
+    };
+    let answers = answers.clone();
+    let reply = Reply::new(move |answer| {
+        let said = match answer {
+            Ok(response) => json!({ "id": id, "response": response }),
+            Err(why) => json!({ "id": id, "error": why }),
+        };
+        // who asks more than it listens to gets no answer
+        let _ = answers.try_send(said.to_string());
+    });
+    site.call(role, &call, request, reply);
+}
+
+async fn send(
+    mut to_page: SplitSink<WebSocket, Message>,
+    site: Arc<Site>,
+    page: PageId,
+    role: Role,
+    mut answers: Receiver<String>,
+) {
+    let mut changes = site.board.changes();
+    let mut frames = interval(FRAME);
+    frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let (mut seen, mut state, mut noted, mut signed) = (0, String::new(), String::new(), Instant::now());
+    loop {
+        let mut messages = Vec::new();
+        while let Ok(answer) = answers.try_recv() {
+            messages.push(Message::text(answer));
+        }
+        let now = text_of("state", &site.state(role)).unwrap_or_default();
+        if now != state {
+            state.clone_from(&now);
+            messages.push(Message::text(now));
+        }
+        let annotations = site.annotations.of(&site.board.session());
+        let now = text_of("annotations", &annotations).unwrap_or_default();
+        if now != noted {
+            noted.clone_from(&now);
+            messages.push(Message::text(now));
+        }
+        messages.extend(site.board.read(&mut seen).into_iter().map(Message::text));
+        let mesh = site.board.mesh_for(page);
+        let has_more = mesh.is_some();
+        messages.extend(mesh.and_then(|patch| Some(Message::binary(frame_of(&patch)?))));
+        if signed.elapsed() >= SIGN_OF_LIFE {
+            signed = Instant::now();
+            // the browser answers the one, the page sees the other
+            messages.extend([Message::Ping(Default::default()), Message::text(state.clone())]);
+        }
+        for message in messages {
+            // a full buffer of the system holds this page up, and nobody else
+            if !matches!(timeout(GONE_AFTER, to_page.send(message)).await, Ok(Ok(()))) {
+                return;
+            }
+        }
+        if !has_more {
+            frames.tick().await;
+            wait(&mut changes, &mut answers, &mut to_page).await;
+        }
+        tokio::task::yield_now().await;
+    }
+}
+
+/// Waits until there may be something new: at most for the period in which the state is looked at.
+async fn wait(
+    changes: &mut watch::Receiver<()>,
+    answers: &mut Receiver<String>,
+    to_page: &mut SplitSink<WebSocket, Message>,
+) {
+    tokio::select! {
+        _ = changes.changed() => {}
+        () = tokio::time::sleep(Duration::from_millis(200)) => {}
+        Some(answer) = answers.recv() => drop(timeout(GONE_AFTER, to_page.send(Message::text(answer))).await),
+    }
+}
+
+/// Kind, three zeros, and the message as it is on the wire of DDS.
+fn frame_of(patch: &MeshPatch) -> Option<Vec<u8>> {
+    let body = cdr_encoding::to_vec::<_, LittleEndian>(patch).ok()?;
+    let mut frame = Vec::with_capacity(8 + body.len());
+    frame.extend([MESH_PATCH, 0, 0, 0, 0, 1, 0, 0]);
+    frame.extend(body);
+    Some(frame)
+}
+
+/// Counts the messages of a page in each second.
+#[derive(Debug, Default)]
+struct Rate {
+    began: Option<Instant>,
+    count: u32,
+}
+
+impl Rate {
+    fn allows(&mut self, now: Instant) -> bool {
+        if self.began.is_none_or(|began| now.saturating_duration_since(began) >= Duration::from_secs(1)) {
+            *self = Self { began: Some(now), count: 0 };
+        }
+        self.count += 1;
+        self.count <= MOST_PER_SECOND
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_may_send_so_much_in_each_second_and_no_more() {
+        let (mut rate, began) = (Rate::default(), Instant::now());
+        let count = |rate: &mut Rate, at| (0..2 * MOST_PER_SECOND).filter(|_| rate.allows(at)).count() as u32;
+        assert_eq!(count(&mut rate, began), MOST_PER_SECOND);
+        assert_eq!(count(&mut rate, began + Duration::from_millis(999)), 0);
+        assert_eq!(count(&mut rate, began + Duration::from_secs(1)), MOST_PER_SECOND);
+    }
+
+    #[test]
+    fn arrays_of_a_mesh_patch_lie_at_multiples_of_their_size_in_a_frame() {
+        let patch = MeshPatch { vertices: vec![7, 8], positions: vec![0.25; 6], ..MeshPatch::default() };
+        let frame = frame_of(&patch).unwrap();
+        assert_eq!(frame[..8], [MESH_PATCH, 0, 0, 0, 0, 1, 0, 0]);
+        let quarters = (0..frame.len() / 4).filter(|at| frame[4 * at..4 * at + 4] == 0.25f32.to_le_bytes()).count();
+        assert_eq!(quarters, 6);
+    }
+}

@@ -1,0 +1,39 @@
+//! The sessions that can be downloaded, and their files piece by piece.
+
+use std::io::{self, Read};
+use std::path::Path;
+
+use futures_util::{Stream, stream};
+use serde_json::{Value, json};
+
+use crate::io::session_folder::{ListedSession, list_sessions};
+
+/// Bytes that are read at a time.
+const PIECE: usize = 256 << 10;
+
+/// All sessions, the newest first.
+///
+/// - `current`: name of the session that runs.
+pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
+    let listed = list_sessions(folder)?;
+    let shown = |ListedSession { name, bytes, files }: ListedSession| json!({ "is_current": name == current, "name": name, "bytes": bytes, "files": files });
+    Ok(listed.into_iter().map(shown).collect())
+}
+
+/// What is left to be read of a file, piece by piece, each on a thread that may wait for the disk.
+pub(super) fn body_of(file: impl Read + Send + 'static) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {
+    stream::unfold(Some(file), |file| async move {
+        let mut file = file?;
+        let read = move || {
+            let mut piece = vec![0; PIECE];
+            let count = file.read(&mut piece)?;
+            piece.truncate(count);
+            Ok((piece, file))
+        };
+        match tokio::task::spawn_blocking(read).await.map_err(io::Error::other).flatten() {
+            Ok((piece, _)) if piece.is_empty() => None,
+            Ok((piece, file)) => Some((Ok(piece), Some(file))),
+            Err(error) => Some((Err(error), None)),
+        }
+    })
+}

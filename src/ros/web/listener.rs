@@ -1,0 +1,91 @@
+//! Connections to the page: how many at a time, within which times, with or without TLS.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::Router;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::time::{sleep, timeout};
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::ServerConfig;
+use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+
+use super::WebError;
+
+/// Connections at a time at most.
+const MOST_CONNECTIONS: usize = 64;
+/// A client has so long for the TLS handshake, and for the head of each request.
+const HEAD_WITHIN: Duration = Duration::from_secs(10);
+/// Wait after an error of the system, as too many open files.
+const AFTER_ERROR: Duration = Duration::from_millis(100);
+
+/// Files of a certificate and of its key, PEM.
+#[derive(Clone, Debug)]
+pub struct Certificate {
+    /// the chain, the server's own first
+    pub chain: PathBuf,
+    /// the private key
+    pub key: PathBuf,
+}
+
+impl Certificate {
+    /// What accepts TLS by it.
+    pub(super) fn acceptor(&self) -> Result<TlsAcceptor, WebError> {
+        let bad = |file: &Path, why: String| WebError::Certificate { file: file.to_owned(), why };
+        let chain = CertificateDer::pem_file_iter(&self.chain).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let chain = chain.map_err(|error| bad(&self.chain, error.to_string()))?;
+        if chain.is_empty() {
+            return Err(bad(&self.chain, "there is no certificate in it".to_owned()));
+        }
+        let key = PrivateKeyDer::from_pem_file(&self.key).map_err(|error| bad(&self.key, error.to_string()))?;
+        let config = ServerConfig::builder().with_no_client_auth().with_single_cert(chain, key);
+        let config = config.map_err(|error| bad(&self.key, error.to_string()))?;
+        Ok(TlsAcceptor::from(Arc::new(config)))
+    }
+}
+
+/// Serves until it is dropped.
+pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, router: Router) {
+    let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    loop {
+        let Ok(place) = Arc::clone(&room).acquire_owned().await else { return };
+        let stream = match listener.accept().await {
+            Ok((stream, _)) => stream,
+            Err(error) => {
+                tracing::warn!(%error, "a connection to the page was not taken");
+                sleep(AFTER_ERROR).await;
+                continue;
+            }
+        };
+        let (tls, router) = (tls.clone(), router.clone());
+        tokio::spawn(async move {
+            // a client that goes away is no matter of ours
+            let _ = connect(stream, tls, router).await;
+            drop(place);
+        });
+    }
+}
+
+async fn connect(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) -> io::Result<()> {
+    // a change of the mesh does not wait for the next
+    stream.set_nodelay(true)?;
+    match tls {
+        None => answer(stream, router).await,
+        Some(tls) => answer(timeout(HEAD_WITHIN, tls.accept(stream)).await??, router).await,
+    }
+}
+
+async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) -> io::Result<()> {
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(HEAD_WITHIN).max_buf_size(64 << 10);
+    let connection = http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+    connection.with_upgrades().await.map_err(io::Error::other)
+}
