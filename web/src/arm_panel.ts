@@ -92,6 +92,11 @@ export class ArmPanel {
     if (this.model.selected !== this.target && (this.step === "planned" || this.step === "approved")) return this.go("choose");
     const stays = arm?.stays_because ?? null;
     this.recover.hidden = !this.needsRecovery && stays === null;
+    // one step at a time: what cannot be done yet takes no room
+    const mayRun = this.step === "approved" || this.step === "running";
+    this.plan.hidden = mayRun;
+    this.approve.hidden = this.step !== "planned";
+    this.run.hidden = !mayRun;
     this.run.classList.toggle("held", this.hold.isHeld);
     const label = this.run.querySelector("span");
     if (label !== null) say(label, this.hold.isHeld ? "holding" : "holdToRun");

@@ -67,6 +67,7 @@ export class Guidance {
     }
     this.bar.max = Math.max(asked.length, 1);
     this.bar.value = reached.length;
+    this.count.hidden = this.bar.hidden = asked.length === 0;
     write(this.count, t("progressCount", { reached: reached.length, all: asked.length }));
     this.next.hidden = this.target === null;
     this.how.hidden = this.target === null;

@@ -10,6 +10,8 @@ export const ICONS = {
   fresh: "M12 5v14M5 12h14",
   sessions: "M4 6h6l2 3h8v10H4z",
   menu: "M5 7h14M5 12h14M5 17h14",
+  check: "M5 4h14v16H5zM8 12l3 3 5-6",
+  share: "M12 15V4M8 8l4-4 4 4M5 12v8h14v-8",
   close: "M6 6l12 12M18 6 6 18",
   whole: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5",
   top: "M4 10l8-5 8 5-8 5zM4 10v5l8 5 8-5v-5",

@@ -163,7 +163,8 @@ export interface Session {
   is_current: boolean;
   bytes: number;
   files: string[];
-  begun: string;
+  /** RFC 3339; absent where nobody wrote it down. */
+  begun?: string;
 }
 
 /** Message of each topic. */

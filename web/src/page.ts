@@ -21,6 +21,8 @@ import { Operating } from "./operating";
 import { Picture } from "./picture";
 import { Sessions } from "./sessions";
 import { settings } from "./settings";
+import { Setup } from "./setup";
+import { Share } from "./share";
 import { applyTheme, StatusBar } from "./status_bar";
 import { installTestHook } from "./test_hook";
 import { ForceBar, ViewBar } from "./view_bar";
@@ -62,7 +64,9 @@ export function buildPage(connection: Connection): void {
   const legend = new Legend(store, picture.mesh, picture.stage);
   const force = new ForceBar();
   const loading = el("p", { class: "loading", attributes: { role: "status" } });
-  const status = new StatusBar(model, () => picture.theme());
+  const setup = new Setup(model, store, picture.tip.state);
+  const share = new Share(operating);
+  const status = new StatusBar(model, () => picture.theme(), () => setup.open(), () => share.show());
   const controls = new Controls(model, operating, () => void sessions.show());
   layOut();
 
@@ -80,11 +84,11 @@ export function buildPage(connection: Connection): void {
   function layOut(): void {
     const sheet = button("sheet", "sheet", () => document.body.classList.toggle("sheet-open"), "ghost sheet-handle", true);
     picture.element.append(loading, new ViewBar(picture.camera).element, force.element, legend.element, flagMenu.element, notices.element);
-    const scroll = el("div", { class: "scroll" }, whyNot(), guidance.element, details.element, list.element);
+    const scroll = el("div", { class: "scroll" }, whyNot(), setup.element, guidance.element, details.element, list.element);
     const panel = el("aside", { class: "panel", label: "panel" }, sheet, scroll, arm.element);
     panel.removeAttribute("title");
     const main = el("main", { class: "main" }, picture.element, controls.element);
-    document.body.append(status.element, status.remedy, el("div", { class: "work" }, main, panel), sessions.element);
+    document.body.append(status.element, status.remedy, el("div", { class: "work" }, main, panel), sessions.element, share.element);
   }
 
   /** Says why the buttons rest. */
@@ -113,6 +117,7 @@ export function buildPage(connection: Connection): void {
     connection.on("mismatch", (message) => {
       picture.tip.mismatch(message);
       force.show(picture.tip.state.force);
+      setup.read();
       picture.stage.ask();
     });
     connection.on("path", ({ poses }) => picture.showPath(poses.map(({ pose }) => pose.position)));
@@ -135,6 +140,7 @@ export function buildPage(connection: Connection): void {
         write(loading, t("loadingPart", { share: percent(store.progress) }));
         if (!store.isWhole) return;
         picture.camera.frameOnce();
+        setup.meshCame();
         legend.meshChanged();
         picture.stage.ask();
       },
