@@ -21,7 +21,7 @@ type Step = "choose" | "planning" | "planned" | "approved" | "running" | "done";
 
 export class ArmPanel {
   readonly element: HTMLElement;
-  private readonly words = el("p", { attributes: { role: "status" } });
+  private readonly words = el("p", { class: "arm-words", attributes: { role: "status" } });
   private readonly plan: HTMLButtonElement;
   private readonly approve: HTMLButtonElement;
   private readonly recover: HTMLButtonElement;
@@ -35,6 +35,7 @@ export class ArmPanel {
   constructor(
     private readonly model: Model,
     private readonly operating: Operating,
+    private readonly onHold: (isHeld: boolean) => void,
   ) {
     this.plan = operating.guard(button("measure", "plan", () => void this.makePlan(), "primary"), () => this.canPlan);
     this.approve = operating.guard(button("accept", "approve", () => this.go("approved")), () => this.step === "planned");
@@ -123,11 +124,13 @@ export class ArmPanel {
     this.target = feature.id;
     this.go("planning");
     const result = await this.probe(feature.id, true, PLAN_WITHIN);
-    this.ended = result?.message ?? "";
-    this.go(result?.code === PLANNED ? "planned" : result === null ? "choose" : "done");
+    const isPlanned = result?.code === PLANNED;
+    this.ended = isPlanned ? result.message : t("armNoPlan", { reason: result?.message ?? "" });
+    this.go(isPlanned ? "planned" : result === null ? "choose" : "done");
   }
 
   private held(isHeld: boolean): void {
+    this.onHold(isHeld);
     if (isHeld && this.step === "approved") void this.start();
     this.show();
   }

@@ -96,6 +96,7 @@ export class FeatureDetails {
     if (this.shown !== feature.id) {
       this.shown = feature.id;
       this.operating.refresh();
+      this.element.scrollIntoView({ block: "start" });
       this.heading.focus({ preventScroll: true });
     }
   }

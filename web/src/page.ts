@@ -28,6 +28,8 @@ import { installTestHook } from "./test_hook";
 import { ForceBar, ViewBar } from "./view_bar";
 import { Vector3 } from "three";
 
+/** Between frames while the arm's button is held, ms. */
+const CALM = 200;
 /** Farther from a feature than this nobody who holds the tip asks for it, m. */
 const NEAR = 0.05;
 
@@ -59,7 +61,7 @@ export function buildPage(connection: Connection): void {
   const list = new FeatureList(model, operating, (id) => model.select(id), showFeatures);
   const details = new FeatureDetails(model, operating);
   const guidance = new Guidance(model, () => list.show(), lookAt);
-  const arm = new ArmPanel(model, operating);
+  const arm = new ArmPanel(model, operating, (isHeld) => (picture.stage.leastInterval = isHeld ? CALM : 0));
   const sessions = new Sessions(notices);
   const legend = new Legend(store, picture.mesh, picture.stage);
   const force = new ForceBar();

@@ -202,6 +202,7 @@ export const texts = {
   armPlanFirst: ["{feature}: first see the plan. Nothing moves for that.", "{feature}: zuerst den Plan ansehen. Dabei bewegt sich nichts.", "{feature}: vea primero el plan. Nada se mueve."],
   armPlanning: ["{feature}: planning …", "{feature}: plane …", "{feature}: planificando …"],
   armPlanned: ["Look at the line in the picture: is the way clear?", "Sehen Sie die Linie im Bild an: Ist der Weg frei?", "Mire la línea en la imagen: ¿está libre el camino?"],
+  armNoPlan: ["There is no way to do that: {reason}", "Dafür gibt es keinen Weg: {reason}", "No hay manera de hacerlo: {reason}"],
   armApproved: ["Approved. The arm moves while you hold the button.", "Freigegeben. Der Arm bewegt sich, solange Sie den Knopf halten.", "Aprobado. El brazo se mueve mientras mantenga el botón."],
   armRuns: ["The arm moves. Let go and it stands.", "Der Arm bewegt sich. Loslassen, und er steht.", "El brazo se mueve. Suelte y se detiene."],
   armStands: ["The arm stands. Hold to go on.", "Der Arm steht. Halten, um fortzufahren.", "El brazo está quieto. Mantenga para seguir."],
