@@ -79,7 +79,7 @@ export type Need =
 /** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
 export function need(feature: NotedFeature, tolerance: number): Need | null {
   if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
-    return { kind: feature.touch_count > 0 ? "unknown" : "untouched", touches: feature.touch_count };
+    return feature.touch_count > 0 ? { kind: "unknown", touches: feature.touch_count } : { kind: "untouched" };
   }
   const asked = sizes(feature).filter((size) => !size.isAtLeast);
   const [widest] = asked.sort((a, b) => (b.u ?? Infinity) - (a.u ?? Infinity));
