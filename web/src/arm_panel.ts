@@ -95,7 +95,7 @@ export class ArmPanel {
     this.recover.hidden = !this.needsRecovery && stays === null;
     // one step at a time: what cannot be done yet takes no room
     const mayRun = this.step === "approved" || this.step === "running";
-    this.plan.hidden = mayRun;
+    this.plan.hidden = mayRun || !this.recover.hidden;
     this.approve.hidden = this.step !== "planned";
     this.run.hidden = !mayRun;
     this.run.classList.toggle("held", this.hold.isHeld);

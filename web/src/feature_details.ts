@@ -7,7 +7,7 @@ import { curvePlot } from "./curve_plot";
 import { coneWords, mainWords, sizes, title } from "./feature_facts";
 import { judgement } from "./feature_list";
 import { onLanguage, t } from "./language";
-import { type NotedFeature, type Mark, Status } from "./messages";
+import { type Mark, type NotedFeature, type ProbeTouch, Status } from "./messages";
 import type { Model } from "./model";
 import { angle, length, percent } from "./numbers";
 import type { Operating } from "./operating";
@@ -25,6 +25,7 @@ export class FeatureDetails {
   private readonly curves = el("div", { class: "curves" });
   private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "80", autocomplete: "off" } });
   private readonly marks: Record<string, HTMLButtonElement>;
+  private plots = new Map<ProbeTouch, HTMLElement>();
   private readonly unflagButton: HTMLButtonElement;
   private shown: number | null = null;
 
@@ -59,6 +60,7 @@ export class FeatureDetails {
     model.on(["features", "selected", "state"], () => this.show());
     model.on(["touches", "selected"], () => this.showCurves());
     onLanguage(() => {
+      this.plots.clear();
       this.show();
       this.showCurves();
     });
@@ -139,8 +141,11 @@ export class FeatureDetails {
 
   private showCurves(): void {
     const touches = this.model.touches.get(this.model.selected ?? -1) ?? [];
+    const plots = touches.map((touch) => this.plots.get(touch) ?? curvePlot(touch));
+    // those that are drawn stay: each touch that comes costs one drawing
+    this.plots = new Map(touches.map((touch, i) => [touch, plots[i]]));
     const heading = touches.length > 0 ? [el("h3", { text: "curves" }), el("p", { class: "muted", text: "curvesHow" })] : [];
-    this.curves.replaceChildren(...heading, ...touches.map(curvePlot));
+    this.curves.replaceChildren(...heading, ...plots);
   }
 
   private async measure(): Promise<void> {

@@ -72,7 +72,7 @@ export class Picture {
   }
 
   showPath(stops: Xyz[]): void {
-    drawPath(this.path, stops, 0.02 * this.size());
+    drawPath(this.path, stops, 0.012 * this.size());
     this.stage.ask();
   }
 
