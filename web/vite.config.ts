@@ -1,6 +1,9 @@
 // How the page is built: one script, one style sheet, no inlined data, so that a strict Content-Security-Policy can hold.
 import { defineConfig } from "vite";
 
+/** Where `npm run dev` finds a node. */
+const NODE = "http://127.0.0.1:8321";
+
 export default defineConfig({
   base: "/",
   build: {
@@ -12,8 +15,9 @@ export default defineConfig({
   server: {
     host: "127.0.0.1",
     proxy: {
-      "/ws": { target: "ws://127.0.0.1:8080", ws: true },
-      "/api": "http://127.0.0.1:8080",
+      // the node checks both names
+      "/ws": { target: NODE, ws: true, changeOrigin: true, headers: { origin: NODE } },
+      "/api": { target: NODE, changeOrigin: true, headers: { origin: NODE } },
     },
   },
 });

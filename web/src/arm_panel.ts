@@ -8,7 +8,7 @@ import { button, el, say, write } from "./dom";
 import { title } from "./feature_facts";
 import { HoldToRun } from "./hold_to_run";
 import { onLanguage, t } from "./language";
-import { type Answer, type Feature, PLANNED, type ProbeResult, STOPPED_FROM } from "./messages";
+import { type Answer, type NotedFeature, PLANNED, type ProbeResult, type State, STOPPED_FROM } from "./messages";
 import type { Model } from "./model";
 import type { Operating } from "./operating";
 import { settings } from "./settings";
@@ -21,7 +21,7 @@ type Step = "choose" | "planning" | "planned" | "approved" | "running" | "done";
 
 export class ArmPanel {
   readonly element: HTMLElement;
-  private readonly words = el("p", { attributes: { role: "status" } });
+  private readonly words = el("p", { class: "arm-words", attributes: { role: "status" } });
   private readonly plan: HTMLButtonElement;
   private readonly approve: HTMLButtonElement;
   private readonly recover: HTMLButtonElement;
@@ -35,6 +35,7 @@ export class ArmPanel {
   constructor(
     private readonly model: Model,
     private readonly operating: Operating,
+    private readonly onHold: (isHeld: boolean) => void,
   ) {
     this.plan = operating.guard(button("measure", "plan", () => void this.makePlan(), "primary"), () => this.canPlan);
     this.approve = operating.guard(button("accept", "approve", () => this.go("approved")), () => this.step === "planned");
@@ -63,8 +64,12 @@ export class ArmPanel {
     this.show();
   }
 
-  private get feature(): Feature | undefined {
+  private get feature(): NotedFeature | undefined {
     return this.model.feature(this.model.selected);
+  }
+
+  private get arm(): State["arm"] {
+    return this.model.state?.arm ?? null;
   }
 
   private get canPlan(): boolean {
@@ -72,7 +77,7 @@ export class ArmPanel {
   }
 
   private get canRun(): boolean {
-    return (this.step === "approved" || this.step === "running") && this.model.state?.arm?.may_move === true;
+    return (this.step === "approved" || this.step === "running") && this.arm?.may_move === true && this.arm.stays_because == null;
   }
 
   private go(step: Step): void {
@@ -82,15 +87,21 @@ export class ArmPanel {
   }
 
   private show(): void {
-    const arm = this.model.state?.arm ?? null;
+    const { arm } = this;
     this.element.hidden = arm === null;
     // a plan is for one feature: another one is chosen, another plan is needed
     if (this.model.selected !== this.target && (this.step === "planned" || this.step === "approved")) return this.go("choose");
-    this.recover.hidden = !this.needsRecovery;
+    const stays = arm?.stays_because ?? null;
+    this.recover.hidden = !this.needsRecovery && stays === null;
+    // one step at a time: what cannot be done yet takes no room
+    const mayRun = this.step === "approved" || this.step === "running";
+    this.plan.hidden = mayRun || !this.recover.hidden;
+    this.approve.hidden = this.step !== "planned";
+    this.run.hidden = !mayRun;
     this.run.classList.toggle("held", this.hold.isHeld);
     const label = this.run.querySelector("span");
     if (label !== null) say(label, this.hold.isHeld ? "holding" : "holdToRun");
-    if (arm !== null) write(this.words, this.sentence(arm.may_move, arm.motion));
+    if (arm !== null) write(this.words, stays === null ? this.sentence(arm.may_move, arm.motion) : t("armStays", { reason: stays }));
   }
 
   private sentence(mayMove: boolean, motion: string): string {
@@ -113,11 +124,13 @@ export class ArmPanel {
     this.target = feature.id;
     this.go("planning");
     const result = await this.probe(feature.id, true, PLAN_WITHIN);
-    this.ended = result?.message ?? "";
-    this.go(result?.code === PLANNED ? "planned" : result === null ? "choose" : "done");
+    const isPlanned = result?.code === PLANNED;
+    this.ended = isPlanned ? result.message : t("armNoPlan", { reason: result?.message ?? "" });
+    this.go(isPlanned ? "planned" : result === null ? "choose" : "done");
   }
 
   private held(isHeld: boolean): void {
+    this.onHold(isHeld);
     if (isHeld && this.step === "approved") void this.start();
     this.show();
   }

@@ -10,7 +10,7 @@ export type ViewName = "whole" | "top" | "front" | "side";
 
 /** From the part to the camera. Not quite from above: there the camera would not know what is up. */
 const DIRECTIONS: Record<ViewName, Vector3> = {
-  whole: new Vector3(-0.55, -1, 0.85),
+  whole: new Vector3(0.55, -1, 0.85),
   top: new Vector3(0, -1e-3, 1),
   front: new Vector3(0, -1, 0),
   side: new Vector3(1, 0, 0),
@@ -19,6 +19,8 @@ const DIRECTIONS: Record<ViewName, Vector3> = {
 const TURN = Math.PI / 24;
 /** One press of plus or minus zooms by this. */
 const ZOOM = 1.2;
+/** Room around the whole part. */
+const MARGIN = 1.12;
 /** Share of the way to the tip that the camera goes in each message. */
 const FOLLOW = 0.3;
 
@@ -42,14 +44,12 @@ export class CameraMan {
 
   /** Has the whole part in the picture, from one of the named sides. */
   show(name: ViewName): void {
-    const radius = this.radius();
-    if (radius === null) return;
+    if (this.radius() === null) return;
     const middle = this.middle();
     const { camera } = this.stage;
-    const half = (camera.fov * Math.PI) / 360;
-    const narrow = Math.atan(Math.tan(half) * Math.min(1, camera.aspect));
-    const distance = (radius * 1.05) / Math.sin(narrow);
-    camera.position.copy(DIRECTIONS[name]).setLength(distance).add(middle);
+    camera.position.copy(DIRECTIONS[name]).add(middle);
+    camera.lookAt(middle);
+    camera.position.copy(DIRECTIONS[name]).setLength(MARGIN * this.distanceForAll()).add(middle);
     this.controls.target.copy(middle);
     this.free();
     this.controls.update();
@@ -141,6 +141,21 @@ export class CameraMan {
     camera.near = near;
     camera.far = far;
     camera.updateProjectionMatrix();
+  }
+
+  /** From the middle of the part, so that every corner of its box is in the picture as the camera is turned now. */
+  private distanceForAll(): number {
+    const { camera } = this.stage;
+    const { low, high } = this.store;
+    const tall = Math.tan((camera.fov * Math.PI) / 360);
+    const back = camera.quaternion.clone().invert();
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = [0, 1, 2].map((axis) => ((corner >> axis) & 1 ? 0.5 : -0.5) * (high[axis] - low[axis]));
+      const seen = new Vector3(...at).applyQuaternion(back);
+      distance = Math.max(distance, seen.z + Math.max(Math.abs(seen.y), Math.abs(seen.x) / camera.aspect) / tall);
+    }
+    return distance;
   }
 
   private middle(): Vector3 {

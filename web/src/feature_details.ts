@@ -4,10 +4,10 @@
  */
 import { button, el, say, write } from "./dom";
 import { curvePlot } from "./curve_plot";
-import { coneWords, sizes, title } from "./feature_facts";
+import { coneWords, mainWords, sizes, title } from "./feature_facts";
 import { judgement } from "./feature_list";
 import { onLanguage, t } from "./language";
-import { type Feature, type Mark, Status } from "./messages";
+import { type Mark, type NotedFeature, type ProbeTouch, Status } from "./messages";
 import type { Model } from "./model";
 import { angle, length, percent } from "./numbers";
 import type { Operating } from "./operating";
@@ -19,10 +19,14 @@ const RELATION_TEXTS: Record<number, TextKey> = { 1: "perpendicularity", 2: "par
 export class FeatureDetails {
   readonly element: HTMLElement;
   private readonly heading = el("h2", { id: "details-title", attributes: { tabindex: "-1" } });
+  private readonly main = el("p", { class: "main-size" });
+  private readonly judged = el("p", { class: "judged" });
   private readonly numbers = el("dl", { class: "numbers" });
   private readonly curves = el("div", { class: "curves" });
-  private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "60", autocomplete: "off" } });
+  private readonly name = el("input", { id: "feature-name", attributes: { type: "text", maxlength: "80", autocomplete: "off" } });
   private readonly marks: Record<string, HTMLButtonElement>;
+  private plots = new Map<ProbeTouch, HTMLElement>();
+  private readonly unflagButton: HTMLButtonElement;
   private shown: number | null = null;
 
   constructor(
@@ -33,38 +37,42 @@ export class FeatureDetails {
     const measure = button("measure", "measureBetter", () => void this.measure(), "primary");
     const unflag = button("reject", "unflag", () => void this.unflag());
     this.marks = {
-      accepted: button("accept", "accept", () => void this.annotate({ mark: this.mark === "accepted" ? "" : "accepted" })),
-      rejected: button("reject", "reject", () => void this.annotate({ mark: this.mark === "rejected" ? "" : "rejected" })),
+      accepted: button("accept", "accept", () => void this.annotate({ mark: this.mark === "accepted" ? "none" : "accepted" })),
+      rejected: button("reject", "reject", () => void this.annotate({ mark: this.mark === "rejected" ? "none" : "rejected" })),
       locked: button("lock", "lock", () => void this.annotate({ is_locked: !this.feature?.is_locked })),
     };
     this.name.addEventListener("change", () => void this.annotate({ name: this.name.value.trim() }));
     for (const each of [measure, this.name, ...Object.values(this.marks)]) operating.guard(each);
-    operating.guard(unflag, () => this.feature?.search_radius != null);
+    operating.guard(unflag);
+    this.unflagButton = unflag;
     const field = el("div", { class: "field" }, el("label", { text: "name", attributes: { for: "feature-name" } }), this.name);
     this.element = el(
       "section",
       { class: "card details", attributes: { "aria-labelledby": "details-title" } },
       el("div", { class: "row start" }, back, this.heading),
+      el("div", {}, this.main, this.judged),
+      measure,
+      el("div", { class: "actions" }, ...Object.values(this.marks), unflag),
       this.numbers,
-      el("div", { class: "actions" }, measure, unflag, ...Object.values(this.marks)),
       field,
       this.curves,
     );
     model.on(["features", "selected", "state"], () => this.show());
     model.on(["touches", "selected"], () => this.showCurves());
     onLanguage(() => {
+      this.plots.clear();
       this.show();
       this.showCurves();
     });
     this.show();
   }
 
-  private get feature(): Feature | undefined {
+  private get feature(): NotedFeature | undefined {
     return this.model.feature(this.model.selected);
   }
 
   private get mark(): Mark {
-    return this.feature?.mark ?? "";
+    return this.feature?.mark ?? "none";
   }
 
   private show(): void {
@@ -75,22 +83,28 @@ export class FeatureDetails {
       return;
     }
     write(this.heading, title(feature));
-    if (document.activeElement !== this.name) this.name.value = feature.name ?? "";
+    if (document.activeElement !== this.name) this.name.value = feature.name;
+    this.unflagButton.hidden = feature.search_radius === null;
+    const [words, level] = judgement(feature);
+    write(this.main, mainWords(feature));
+    write(this.judged, words);
+    this.judged.dataset.level = level;
     this.marks.accepted.setAttribute("aria-pressed", String(feature.mark === "accepted"));
     this.marks.rejected.setAttribute("aria-pressed", String(feature.mark === "rejected"));
-    this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked ?? false));
+    this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked));
     const lock = this.marks.locked.querySelector("span");
     if (lock !== null) say(lock, feature.is_locked ? "unlock" : "lock");
     this.numbers.replaceChildren(...this.facts(feature).flatMap(([term, words]) => [el("dt", {}, term), el("dd", {}, words)]));
     if (this.shown !== feature.id) {
       this.shown = feature.id;
       this.operating.refresh();
+      this.element.scrollIntoView({ block: "start" });
       this.heading.focus({ preventScroll: true });
     }
   }
 
-  private facts(feature: Feature): Array<[string, string]> {
-    const facts: Array<[string, string]> = [[t("state"), judgement(feature)[0]]];
+  private facts(feature: NotedFeature): Array<[string, string]> {
+    const facts: Array<[string, string]> = [];
     for (const size of sizes(feature)) facts.push([t(size.text), size.isAtLeast ? `${size.words} · ${t("endNotFelt")}` : size.words]);
     const cone = coneWords(feature);
     if (cone !== null) facts.push([t("coneAngle"), cone]);
@@ -109,7 +123,7 @@ export class FeatureDetails {
     return [...facts, ...this.relations(feature)];
   }
 
-  private relations(feature: Feature): Array<[string, string]> {
+  private relations(feature: NotedFeature): Array<[string, string]> {
     const facts: Array<[string, string]> = [];
     for (const relation of this.model.relations) {
       const key = RELATION_TEXTS[relation.kind];
@@ -127,8 +141,11 @@ export class FeatureDetails {
 
   private showCurves(): void {
     const touches = this.model.touches.get(this.model.selected ?? -1) ?? [];
+    const plots = touches.map((touch) => this.plots.get(touch) ?? curvePlot(touch));
+    // those that are drawn stay: each touch that comes costs one drawing
+    this.plots = new Map(touches.map((touch, i) => [touch, plots[i]]));
     const heading = touches.length > 0 ? [el("h3", { text: "curves" }), el("p", { class: "muted", text: "curvesHow" })] : [];
-    this.curves.replaceChildren(...heading, ...touches.map(curvePlot));
+    this.curves.replaceChildren(...heading, ...plots);
   }
 
   private async measure(): Promise<void> {
@@ -136,7 +153,7 @@ export class FeatureDetails {
     if (feature === undefined) return;
     const request = {
       kind: feature.kind,
-      point: { header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" }, point: feature.center },
+      point: { header: { frame_id: this.model.frame }, point: feature.center },
       search_radius: feature.search_radius ?? Math.max(feature.diameter ?? 0, feature.width ?? 0, feature.length ?? 0, 4e-3) * 0.75,
     };
     await this.operating.call("~/flag_feature", request, () => t("willMeasure", { feature: title(feature) }));
@@ -150,7 +167,6 @@ export class FeatureDetails {
   private async annotate(change: { name?: string; mark?: Mark; is_locked?: boolean }): Promise<void> {
     const { feature } = this;
     if (feature === undefined) return;
-    const now = { id: feature.id, name: feature.name ?? "", mark: this.mark, is_locked: feature.is_locked ?? false };
-    await this.operating.call("~/annotate_feature", { ...now, ...change });
+    await this.operating.call("~/annotate_feature", { id: feature.id, ...change });
   }
 }

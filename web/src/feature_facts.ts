@@ -1,8 +1,9 @@
 /**
  * What a feature says to an operator: its name, its sizes with U, and which of its numbers wants more touches.
  */
+import { Vector3 } from "three";
 import { t } from "./language";
-import { type Feature, FittedTo, Kind, type Num, Status } from "./messages";
+import { type NotedFeature, FittedTo, Kind, type Num, Status, triple } from "./messages";
 import { angle, expanded, length } from "./numbers";
 import type { TextKey } from "./texts";
 
@@ -20,13 +21,13 @@ export function kindText(kind: number): TextKey {
 }
 
 /** "Hole 3", or "Hole 3 · upper left" where it was named. */
-export function title(feature: Feature): string {
+export function title(feature: NotedFeature): string {
   const plain = `${t(kindText(feature.kind))} ${feature.id}`;
   return feature.name ? `${plain} · ${feature.name}` : plain;
 }
 
 /** A part has dozens of edges, corners and planes: they speak for themselves. */
-export function isMinor(feature: Feature): boolean {
+export function isMinor(feature: NotedFeature): boolean {
   const { kind, status } = feature;
   return (kind === Kind.edge || kind === Kind.corner || kind === Kind.plane) && status === Status.found;
 }
@@ -42,7 +43,7 @@ export interface Size {
 }
 
 /** Every length that is known of it, the one that it is ordered by first. */
-export function sizes(feature: Feature): Size[] {
+export function sizes(feature: NotedFeature): Size[] {
   const size = (text: TextKey, value: Num, std: Num, isAtLeast = false): Size | null => {
     const words = length(value, isAtLeast ? null : std, isAtLeast);
     return words === null ? null : { text, words, value: value ?? 0, u: expanded(std), isAtLeast };
@@ -57,15 +58,15 @@ export function sizes(feature: Feature): Size[] {
 }
 
 /** "Ø 8.021 ± 0.025 mm", "6.00 × 20.0 mm": its main numbers in one line. */
-export function mainWords(feature: Feature): string {
+export function mainWords(feature: NotedFeature): string {
   if (feature.status === Status.flagged) return t("notMeasured");
   const [first, second] = sizes(feature).filter((size) => size.text !== "depth" && size.text !== "height");
   if (first === undefined) return length(feature.depth, feature.depth_std, feature.depth_is_at_least) ?? "";
   if (first.text === "diameter") return `Ø ${first.words}`;
-  return second === undefined ? first.words : `${first.words} × ${second.words}`;
+  return second === undefined ? first.words : `${first.words.replace("\u00a0mm", "")} × ${second.words}`;
 }
 
-export function coneWords(feature: Feature): string | null {
+export function coneWords(feature: NotedFeature): string | null {
   return angle(feature.cone_angle, feature.cone_angle_std);
 }
 
@@ -76,9 +77,9 @@ export type Need =
   | { kind: "wide"; size: TextKey; u: number };
 
 /** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
-export function need(feature: Feature, tolerance: number): Need | null {
+export function need(feature: NotedFeature, tolerance: number): Need | null {
   if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
-    return { kind: feature.touch_count > 0 ? "unknown" : "untouched", touches: feature.touch_count };
+    return feature.touch_count > 0 ? { kind: "unknown", touches: feature.touch_count } : { kind: "untouched" };
   }
   const asked = sizes(feature).filter((size) => !size.isAtLeast);
   const [widest] = asked.sort((a, b) => (b.u ?? Infinity) - (a.u ?? Infinity));
@@ -88,13 +89,26 @@ export function need(feature: Feature, tolerance: number): Need | null {
 }
 
 /** Whether the tolerance is asked of it: it has a size, and nobody threw it out. */
-export function isAsked(feature: Feature): boolean {
+export function isAsked(feature: NotedFeature): boolean {
   return !isMinor(feature) && feature.mark !== "rejected";
 }
 
 /** How much a feature wants touches: U over the tolerance, endless where nothing is known. */
-export function urgency(feature: Feature, tolerance: number): number {
+export function urgency(feature: NotedFeature, tolerance: number): number {
   const wanted = need(feature, tolerance);
   if (wanted === null) return 0;
   return wanted.kind === "wide" ? wanted.u / tolerance : Infinity;
+}
+
+/** The one whose center is nearest, of those that somebody asks for. @param within farther than this none is, m. */
+export function nearestTo(place: Vector3, features: NotedFeature[], within: number): NotedFeature | null {
+  let nearest: NotedFeature | null = null;
+  let least = within;
+  for (const feature of features) {
+    const center = triple(feature.center);
+    if (center === null || isMinor(feature)) continue;
+    const distance = place.distanceTo(new Vector3(...center));
+    if (distance < least) [nearest, least] = [feature, distance];
+  }
+  return nearest;
 }

@@ -5,7 +5,7 @@
 import { button, el, write } from "./dom";
 import { isAsked, isMinor, kindText, mainWords, need } from "./feature_facts";
 import { onLanguage, t } from "./language";
-import { type Feature, FittedTo, Status } from "./messages";
+import { type NotedFeature, FittedTo, Status } from "./messages";
 import type { Model } from "./model";
 import { percent } from "./numbers";
 import type { Operating } from "./operating";
@@ -32,7 +32,7 @@ export class FeatureList {
     private readonly onSelect: (id: number) => void,
     onFilter: () => void,
   ) {
-    const detect = button("fresh", "detect", () => void operating.call("~/detect_features", {}, (answer) => answer.message));
+    const detect = button("search", "detect", () => void operating.call("~/detect_features", {}, (answer) => answer.message));
     this.all.checked = settings.showsAll;
     this.all.addEventListener("change", () => {
       keep({ showsAll: this.all.checked });
@@ -72,14 +72,14 @@ export class FeatureList {
   private add(id: number): Row {
     const [number, name, size, state] = ["number", "name", "size", "state"].map((part) => el("span", { class: part }));
     const element = el("button", { class: "feature", attributes: { type: "button" }, onClick: () => this.onSelect(id) });
-    element.append(number, name, size, state);
+    element.append(number, name, state, size);
     this.list.append(el("li", {}, element));
     const row = { element, number, name, size, state };
     this.rows.set(id, row);
     return row;
   }
 
-  private fill(row: Row, feature: Feature): void {
+  private fill(row: Row, feature: NotedFeature): void {
     write(row.number, String(feature.id));
     write(row.name, feature.name || t(kindText(feature.kind)));
     write(row.size, mainWords(feature));
@@ -92,7 +92,7 @@ export class FeatureList {
 }
 
 /** What is to be said of it in a few words, with a sign that needs no colour. */
-export function judgement(feature: Feature): [words: string, level: "good" | "open" | "plain"] {
+export function judgement(feature: NotedFeature): [words: string, level: "good" | "open" | "plain"] {
   const lock = feature.is_locked ? ` · ${t("locked")}` : "";
   if (feature.mark === "accepted") return [`✓ ${t("accepted")}${lock}`, "good"];
   if (feature.mark === "rejected") return [`✕ ${t("rejected")}${lock}`, "plain"];

@@ -2,6 +2,7 @@
 import { button, el } from "./dom";
 import { FLAGGABLE, kindText } from "./feature_facts";
 import { t } from "./language";
+import type { Model } from "./model";
 import type { Operating } from "./operating";
 
 /** How far around is looked when nothing else is known: the parameter flag_radius_mm. */
@@ -13,7 +14,10 @@ export class FlagMenu {
   /** Called when it closes, so that the mark on the part goes. */
   onClose: () => void = () => {};
 
-  constructor(private readonly operating: Operating) {
+  constructor(
+    private readonly model: Model,
+    private readonly operating: Operating,
+  ) {
     const kinds = FLAGGABLE.map((kind) => operating.guard(button(null, kindText(kind), () => void this.flag(kind))));
     const close = button("close", "close", () => this.close(), "ghost", true);
     this.element.append(
@@ -47,7 +51,7 @@ export class FlagMenu {
     this.close();
     const request = {
       kind,
-      point: { header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" }, point: { x, y, z } },
+      point: { header: { frame_id: this.model.frame }, point: { x, y, z } },
       search_radius: AS_CONFIGURED,
     };
     await this.operating.call("~/flag_feature", request, () => t("flagged", { kind: t(kindText(kind)) }));

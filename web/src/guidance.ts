@@ -3,10 +3,11 @@
  *
  * Next is the feature whose U is widest against the tolerance; one that nothing is known of comes first.
  */
+import type { Vector3 } from "three";
 import { el, write } from "./dom";
-import { isAsked, kindText, need, title, urgency } from "./feature_facts";
+import { isAsked, nearestTo, need, title, urgency } from "./feature_facts";
 import { onLanguage, t } from "./language";
-import type { Feature } from "./messages";
+import type { NotedFeature } from "./messages";
 import type { Model } from "./model";
 import { decimal, typedMillimetres, uncertainty } from "./numbers";
 import { keep, settings } from "./settings";
@@ -18,13 +19,14 @@ export class Guidance {
   private readonly how = el("p", { class: "muted how" });
   private readonly bar = el("progress", { id: "progress", label: "progress" });
   private readonly count = el("label", { attributes: { for: "progress" } });
-  private target: Feature | null = null;
-  private hasArrow = false;
+  private target: NotedFeature | null = null;
+  /** Where the green arrow points, m. */
+  private arrowAt: Vector3 | null = null;
 
   constructor(
     private readonly model: Model,
     private readonly onTolerance: () => void,
-    onShow: (feature: Feature) => void,
+    onShow: (feature: NotedFeature) => void,
   ) {
     this.next.addEventListener("click", () => this.target !== null && onShow(this.target));
     this.element = el(
@@ -40,12 +42,16 @@ export class Guidance {
     this.show();
   }
 
-  /** Whether the green arrow is drawn. */
-  arrow(isThere: boolean): void {
-    if (isThere !== this.hasArrow) {
-      this.hasArrow = isThere;
-      this.show();
-    }
+  /** The green arrow is for the feature next to the tip, which may be another one than that to be touched next. */
+  arrow(at: Vector3 | null): void {
+    this.arrowAt = at;
+    this.showHow();
+  }
+
+  private showHow(): void {
+    const pointed = this.arrowAt === null ? null : nearestTo(this.arrowAt, this.model.features, Infinity);
+    const isHere = pointed !== null && pointed.id === this.target?.id;
+    write(this.how, t(isHere ? "guidanceArrow" : "guidanceSpread"));
   }
 
   private show(): void {
@@ -54,12 +60,14 @@ export class Guidance {
     const reached = asked.filter((feature) => need(feature, tolerance) === null);
     this.target = null;
     for (const feature of asked) {
-      if (feature.is_locked) continue;
+      // somebody is content with it as it is
+      if (feature.is_locked || feature.mark === "accepted") continue;
       const most = this.target === null ? 0 : urgency(this.target, tolerance);
       if (urgency(feature, tolerance) > most) this.target = feature;
     }
     this.bar.max = Math.max(asked.length, 1);
     this.bar.value = reached.length;
+    this.count.hidden = this.bar.hidden = asked.length === 0;
     write(this.count, t("progressCount", { reached: reached.length, all: asked.length }));
     this.next.hidden = this.target === null;
     this.how.hidden = this.target === null;
@@ -69,13 +77,13 @@ export class Guidance {
     }
     write(this.next, t("guidanceNext", { feature: title(this.target) }));
     write(this.why, this.reason(this.target));
-    write(this.how, t(this.hasArrow ? "guidanceArrow" : "guidanceSpread"));
+    this.showHow();
   }
 
-  private reason(feature: Feature): string {
+  private reason(feature: NotedFeature): string {
     const wanted = need(feature, settings.tolerance);
     if (wanted === null) return "";
-    if (wanted.kind === "untouched") return t("needUntouched", { kind: t(kindText(feature.kind)) });
+    if (wanted.kind === "untouched") return t("needUntouched");
     if (wanted.kind === "unknown") return t("needUnknown", { touches: wanted.touches });
     return t("needWide", {
       size: t(wanted.size),

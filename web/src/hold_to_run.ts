@@ -69,10 +69,11 @@ export class HoldToRun {
 
   private begin(): void {
     if (this.isHeld || !this.hold.mayBegin() || document.visibilityState !== "visible") return;
+    // the first beat goes before the order that it allows
+    if (!this.hold.send(++this.beat)) return;
     this.isHeld = true;
+    this.timer = setInterval(() => this.tick(), BEAT);
     this.hold.onChange(true);
-    this.tick();
-    if (this.isHeld) this.timer = setInterval(() => this.tick(), BEAT);
   }
 
   private tick(): void {

@@ -10,6 +10,8 @@ export const ICONS = {
   fresh: "M12 5v14M5 12h14",
   sessions: "M4 6h6l2 3h8v10H4z",
   menu: "M5 7h14M5 12h14M5 17h14",
+  check: "M5 4h14v16H5zM8 12l3 3 5-6",
+  share: "M12 15V4M8 8l4-4 4 4M5 12v8h14v-8",
   close: "M6 6l12 12M18 6 6 18",
   whole: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5",
   top: "M4 10l8-5 8 5-8 5zM4 10v5l8 5 8-5v-5",
@@ -21,11 +23,8 @@ export const ICONS = {
   reject: "M7 7l10 10M17 7 7 17",
   lock: "M6 11h12v9H6zM9 11V7a3 3 0 0 1 6 0v4",
   back: "M15 5l-7 7 7 7",
-  flag: "M6 21V4M6 5h11l-2 4 2 4H6",
   stop: "M7 7h10v10H7z",
-  hand: "M8 12V6a1.5 1.5 0 0 1 3 0v5V4.5a1.5 1.5 0 0 1 3 0V11V6a1.5 1.5 0 0 1 3 0v9a6 6 0 0 1-6 6c-4 0-5-3-7-7a1.5 1.5 0 0 1 2.5-1.5z",
-  down: "M12 4v12M7 11l5 5 5-5",
-  tip: "M12 3v9M12 12a4 4 0 1 0 0 8 4 4 0 0 0 0-8",
+  search: "M10.5 4a6.5 6.5 0 1 0 0 13 6.5 6.5 0 0 0 0-13M15.5 15.5 20 20",
   sheet: "M7 14l5-5 5 5",
 } as const;
 

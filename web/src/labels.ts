@@ -5,8 +5,11 @@
 import { Vector3 } from "three";
 import { el, write } from "./dom";
 import { title } from "./feature_facts";
-import { type Feature, Status, triple } from "./messages";
+import { type NotedFeature, Status, triple } from "./messages";
 import type { Stage } from "./stage";
+
+/** The words at the tip stand so far beside it, as in the style sheet, px. */
+const TIP_OFFSET = 20;
 
 interface Label {
   element: HTMLButtonElement;
@@ -17,7 +20,9 @@ interface Label {
 export class Labels {
   readonly layer = el("div", { class: "labels" });
   private readonly features = new Map<number, Label>();
-  private readonly tip = el("output", { class: "tip-label", attributes: { "aria-live": "off" } });
+  private readonly tipNumber = el("strong");
+  private readonly tipFeature = el("span");
+  private readonly tip = el("output", { class: "tip-label", attributes: { "aria-live": "off" } }, this.tipNumber, this.tipFeature);
   private tipPlace: Vector3 | null = null;
 
   constructor(
@@ -28,7 +33,7 @@ export class Labels {
     stage.afterFrame.push(() => this.move());
   }
 
-  show(features: Feature[], selected: number | null): void {
+  show(features: NotedFeature[], selected: number | null): void {
     const shown = new Set<number>();
     for (const feature of features) {
       const center = triple(feature.center);
@@ -52,11 +57,12 @@ export class Labels {
     this.stage.ask();
   }
 
-  /** @param words null: no tip is there. */
-  showTip(place: Vector3 | null, words: string | null): void {
+  /** @param place null: no tip is there. */
+  showTip(place: Vector3 | null, number: string, feature: string): void {
     this.tipPlace = place;
-    write(this.tip, words ?? "");
-    this.tip.hidden = place === null || words === null;
+    write(this.tipNumber, number);
+    write(this.tipFeature, feature);
+    this.tip.hidden = place === null;
   }
 
   private add(id: number): Label {
@@ -82,7 +88,7 @@ export class Labels {
     const at = place.clone().project(this.stage.camera);
     const isInView = Math.abs(at.x) < 1 && Math.abs(at.y) < 1 && at.z < 1;
     element.classList.toggle("out", !isInView);
-    const x = ((at.x + 1) / 2) * width;
+    const x = Math.min(((at.x + 1) / 2) * width, width - (element === this.tip ? element.offsetWidth + TIP_OFFSET : 0));
     const y = ((1 - at.y) / 2) * height;
     if (isInView) element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }

@@ -25,7 +25,8 @@ export class Legend {
     private readonly stage: Stage,
   ) {
     const name = el("label", { text: "colourBy", attributes: { for: "colour-by" } });
-    this.element = el("section", { class: "legend", label: "legend" }, el("div", { class: "row" }, name, this.choice), this.key);
+    this.element = el("section", { class: "legend", label: "legend" }, el("div", { class: "row" }, name, this.choice), this.folded());
+    this.element.removeAttribute("title");
     this.choice.addEventListener("change", () => {
       this.mode = modeNamed(this.choice.value);
       keep({ colourBy: this.mode.name });
@@ -44,6 +45,13 @@ export class Legend {
       this.offer();
       if (this.mode.categories === null && scaleEnd(this.mode, this.store) !== this.end) this.apply();
     }, RENEW);
+  }
+
+  /** The legend proper can be folded away, and is at first where the picture is small. */
+  private folded(): HTMLElement {
+    const folded = el("details", {}, el("summary", { text: "legend" }), this.key);
+    folded.open = !matchMedia("(max-width: 640px)").matches;
+    return folded;
   }
 
   /** Only what the mesh has can be chosen. */

@@ -1,4 +1,5 @@
 /** Where the page begins: its style, its line to the node, its parts. */
+import "./theme.css";
 import "./style.css";
 import { Connection } from "./connection";
 import { t } from "./language";

@@ -49,7 +49,7 @@ const FRAGMENT = /* glsl */ `
     }
     float facing = abs(dot(normal, normalize(-vPlace)));
     float above = 0.5 + 0.5 * dot(normal, normalize(vec3(-0.35, 0.8, 0.5)));
-    float light = 0.36 + 0.42 * facing + 0.26 * above;
+    float light = 0.40 + 0.42 * facing + 0.28 * above;
     colour = vec4(own * light, 1.0);
   }
 `;

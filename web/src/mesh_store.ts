@@ -46,6 +46,13 @@ export class MeshStore {
   /** What the parts of the whole state named so far; null between whole states. */
   private whole: { vertices: Uint8Array; faces: Uint8Array } | null = null;
   private nextPart = 0;
+  /** How much of the whole state that is coming has come, 0 to 1. */
+  progress = 0;
+
+  /** Whether the mesh is that of a version now: not between the parts of a change, where a face may lack a vertex. */
+  get isWhole(): boolean {
+    return this.version > 0 && this.nextPart === 0;
+  }
 
   /** @throws GapError when it does not continue what is here, or its counts do not come out. */
   apply(patch: MeshPatch): void {
@@ -56,6 +63,7 @@ export class MeshStore {
     this.setFaces(patch);
     for (const vertex of patch.removedVertices) this.removeVertex(vertex);
     this.nextPart = patch.part + 1;
+    this.progress = this.nextPart / patch.partCount;
     if (this.nextPart < patch.partCount) return;
     this.nextPart = 0;
     this.sweep();
@@ -77,7 +85,7 @@ export class MeshStore {
       return true;
     }
     if (patch.session !== this.session) throw new GapError(`a change of session ${patch.session}, here is ${this.session}`);
-    if (patch.version <= this.version) return false;
+    if (patch.baseVersion !== this.version && patch.version <= this.version) return false;
     if (this.whole !== null || patch.baseVersion !== this.version) {
       throw new GapError(`a change from version ${patch.baseVersion}, here is ${this.version}`);
     }

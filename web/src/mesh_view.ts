@@ -19,6 +19,7 @@ export class MeshView {
   constructor(private readonly store: MeshStore) {
     // the part is always looked at: to ask whether it is in view costs a pass over all vertices
     this.mesh.frustumCulled = false;
+    this.mesh.visible = false;
   }
 
   colourBy(mode: ColourMode, scaleEnd: number): void {
@@ -28,6 +29,9 @@ export class MeshView {
   /** Before each frame: takes over what the store says has changed. */
   update(): void {
     const { store } = this;
+    // until all parts of a change are here the last version stays in the picture
+    if (!store.isWhole) return;
+    this.mesh.visible = true;
     const hasDeviation = store.deviation !== null;
     if (this.generation !== store.generation || this.hasDeviation !== hasDeviation) this.rebuild();
     else this.markRanges();

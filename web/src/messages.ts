@@ -18,7 +18,7 @@ export interface State {
   session: string;
   is_paused: boolean;
   scan: { file: string; faces: number };
-  arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts" };
+  arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts"; stays_because?: string | null };
   clients: number;
 }
 
@@ -28,7 +28,7 @@ export const Kind = {
 export const Status = { flagged: 1, found: 2, probed: 3 } as const;
 export const FittedTo = { nothing: 0, mesh: 1, touches: 2 } as const;
 
-export type Mark = "" | "accepted" | "rejected";
+export type Mark = "none" | "accepted" | "rejected";
 
 export interface FormDeviation {
   characteristic: number;
@@ -69,10 +69,20 @@ export interface Feature {
   group: number;
   points: Xyz[];
   form: FormDeviation[];
-  /** What somebody said of it; absent where the node keeps none of that. */
-  name?: string;
-  mark?: Mark;
-  is_locked?: boolean;
+}
+
+/** What operators said of a feature; `locked`: as it was when somebody locked it, which is what counts from then on. */
+export interface Annotation {
+  name: string;
+  mark: Mark;
+  locked: Feature | null;
+}
+
+/** A feature as it is shown: with what was said of it. */
+export interface NotedFeature extends Feature {
+  name: string;
+  mark: Mark;
+  is_locked: boolean;
 }
 
 export interface Relation {
@@ -90,6 +100,7 @@ export interface Relation {
 }
 
 export interface FeatureArray {
+  header: { frame_id: string };
   session: string;
   mesh_version: number;
   features: Feature[];
@@ -152,13 +163,15 @@ export interface Session {
   is_current: boolean;
   bytes: number;
   files: string[];
-  begun: string;
+  /** RFC 3339; absent where nobody wrote it down. */
+  begun?: string;
 }
 
 /** Message of each topic. */
 export interface Topics {
   state: State;
   features: FeatureArray;
+  annotations: { session: string; features: Record<string, Annotation> };
   tip: { markers: Marker[] };
   mismatch: Mismatch;
   diagnostics: { status: DiagnosticStatus[] };

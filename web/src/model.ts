@@ -3,7 +3,7 @@
  * changes.
  */
 import type { Connection, LineState } from "./connection";
-import type { DiagnosticStatus, Feature, ProbeResult, ProbeTouch, Relation, State } from "./messages";
+import type { Annotation, DiagnosticStatus, Feature, NotedFeature, ProbeResult, ProbeTouch, Relation, State } from "./messages";
 
 /** What changed. */
 export type Part = "state" | "line" | "features" | "diagnostics" | "selected" | "touches" | "result";
@@ -14,7 +14,9 @@ const MOST_TOUCHES = 200;
 export class Model {
   state: State | null = null;
   line: LineState = { kind: "connecting" };
-  features: Feature[] = [];
+  features: NotedFeature[] = [];
+  /** Name of the frame that all places are in, which calls have to name too. */
+  frame = "object";
   relations: Relation[] = [];
   /** The first status: whether what comes is used. */
   input: DiagnosticStatus | null = null;
@@ -22,6 +24,8 @@ export class Model {
   readonly touches = new Map<number, ProbeTouch[]>();
   result: ProbeResult | null = null;
   selected: number | null = null;
+  private measured: Feature[] = [];
+  private annotations: Record<string, Annotation> = {};
   private readonly listeners: Array<[Part[], () => void]> = [];
 
   constructor(connection: Connection) {
@@ -29,8 +33,16 @@ export class Model {
     connection.on("state", (state) => this.set("state", () => this.takeState(state)));
     connection.on("features", (message) =>
       this.set("features", () => {
-        this.features = message.features;
+        this.measured = message.features;
         this.relations = message.relations ?? [];
+        this.frame = message.header?.frame_id || this.frame;
+        this.note();
+      }),
+    );
+    connection.on("annotations", (message) =>
+      this.set("features", () => {
+        this.annotations = message.features;
+        this.note();
       }),
     );
     connection.on("diagnostics", (message) => this.set("diagnostics", () => (this.input = message.status[0] ?? null)));
@@ -42,7 +54,7 @@ export class Model {
     this.listeners.push([parts, listener]);
   }
 
-  feature(id: number | null): Feature | undefined {
+  feature(id: number | null): NotedFeature | undefined {
     return this.features.find((feature) => feature.id === id);
   }
 
@@ -57,6 +69,14 @@ export class Model {
   /** Whether calls may be made here now. */
   get mayOperate(): boolean {
     return this.isConnected && this.state?.role === "operate";
+  }
+
+  /** Puts what was measured and what was said of it together; of a locked feature the numbers stay as they were. */
+  private note(): void {
+    this.features = this.measured.map((feature) => {
+      const { name = "", mark = "none", locked = null } = this.annotations[feature.id] ?? {};
+      return { ...feature, ...locked, name, mark, is_locked: locked !== null };
+    });
   }
 
   private takeState(state: State): void {

@@ -27,8 +27,13 @@ export class Notices {
       console.error(error);
       return this.bad(t("failedFault"));
     }
-    const plain = { refused: t("failedRefused"), lost: t("failedLost"), late: t("failedLate") }[error.reason];
-    this.bad(error.sentence === null ? plain : `${plain} ${error.sentence}`);
+    if (error.reason === "refused") return this.refused(error.sentence ?? "");
+    this.bad(t(error.reason === "lost" ? "failedLost" : "failedLate"));
+  }
+
+  /** @param reason the node's own sentence. */
+  refused(reason: string): void {
+    this.bad(t("failedRefused", { reason }));
   }
 
   private tell(words: string, kind: keyof typeof STAYS): void {

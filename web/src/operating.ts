@@ -34,7 +34,7 @@ export class Operating {
         if (done !== undefined) this.notices.good(done(answer));
         return answer;
       }
-      this.notices.bad(`${t("failedRefused")} ${answer.message}`);
+      this.notices.refused(answer.message);
     } catch (error) {
       this.notices.failed(error);
     }

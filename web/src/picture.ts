@@ -9,7 +9,7 @@ import { Labels } from "./labels";
 import { label } from "./language";
 import type { MeshStore } from "./mesh_store";
 import { MeshView } from "./mesh_view";
-import type { Feature, Xyz } from "./messages";
+import type { NotedFeature, Xyz } from "./messages";
 import { type Hit, pick } from "./pick";
 import { Stage } from "./stage";
 import { TipView } from "./tip_view";
@@ -66,13 +66,13 @@ export class Picture {
     this.stage.ask();
   }
 
-  showFeatures(features: Feature[], selected: number | null): void {
+  showFeatures(features: NotedFeature[], selected: number | null): void {
     drawFeatures(this.features, features, selected);
     this.labels.show(features, selected);
   }
 
   showPath(stops: Xyz[]): void {
-    drawPath(this.path, stops, 0.02 * this.size());
+    drawPath(this.path, stops, 0.012 * this.size());
     this.stage.ask();
   }
 

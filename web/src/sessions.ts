@@ -36,10 +36,11 @@ export class Sessions {
 }
 
 function entry(session: Session): HTMLElement {
-  const begun = new Date(session.begun);
+  const begun = new Date(session.begun ?? "");
   const when = Number.isNaN(begun.valueOf())
     ? ""
     : new Intl.DateTimeFormat(locale(), { dateStyle: "medium", timeStyle: "short" }).format(begun);
+  const facts = [when, bytes(session.bytes)].filter((fact) => fact !== "").join(" · ");
   const link = (file: string): HTMLElement => {
     const href = `/api/sessions/${encodeURIComponent(session.name)}/${encodeURIComponent(file)}`;
     return el("li", {}, el("a", { attributes: { href, download: file } }, file));
@@ -49,7 +50,7 @@ function entry(session: Session): HTMLElement {
   return el(
     "details",
     { class: "session" },
-    el("summary", {}, el("strong", {}, session.name), " ", current, el("span", { class: "muted" }, `${when} · ${bytes(session.bytes)}`)),
+    el("summary", {}, el("strong", {}, session.name), " ", current, el("span", { class: "muted" }, facts)),
     session.files.length > 0 ? files : el("p", { class: "muted", text: "noFiles" }),
   );
 }

@@ -11,9 +11,11 @@ export interface Settings {
   /** Wanted expanded uncertainty, m. */
   tolerance: number;
   showsAll: boolean;
+  /** Scan whose size and place somebody has looked at here. */
+  checkedScan: string;
 }
 
-const DEFAULTS: Settings = { language: "", theme: "auto", colourBy: "support", tolerance: 0.02e-3, showsAll: false };
+const DEFAULTS: Settings = { language: "", theme: "auto", colourBy: "support", tolerance: 0.02e-3, showsAll: false, checkedScan: "" };
 
 export const settings: Settings = read();
 

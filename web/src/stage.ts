@@ -20,6 +20,9 @@ export class Stage {
   readonly beforeFrame: Array<() => void> = [];
   /** Called after each frame, to move what is HTML. */
   readonly afterFrame: Array<() => void> = [];
+  /** Frames are so far apart at least, ms: while the arm's button is held its beats go first. */
+  leastInterval = 0;
+  private lastFrame = 0;
   private isAsked = false;
   private resting: Array<() => void> = [];
 
@@ -40,7 +43,10 @@ export class Stage {
   ask(): void {
     if (this.isAsked) return;
     this.isAsked = true;
-    requestAnimationFrame(() => this.frame());
+    const draw = (): number => requestAnimationFrame(() => this.frame());
+    const wait = this.lastFrame + this.leastInterval - performance.now();
+    if (wait > 0) setTimeout(draw, wait);
+    else draw();
   }
 
   /** Resolves when nothing waits to be drawn. */
@@ -67,6 +73,7 @@ export class Stage {
 
   private frame(): void {
     const begin = performance.now();
+    this.lastFrame = begin;
     this.isAsked = false;
     for (const each of this.beforeFrame) each();
     this.renderer.render(this.scene, this.camera);

@@ -2,13 +2,15 @@
  * The bar at the top: which part and session, whether the line stands, whether what comes from the sensors is used and what to do
  * if not, who looks and who operates, language and theme.
  */
-import { el, say, write } from "./dom";
+import { button, el, say, write } from "./dom";
 import { language, onLanguage, speak, t } from "./language";
 import type { Model } from "./model";
 import { keep, settings, type Settings } from "./settings";
 import { LANGUAGE_NAMES, LANGUAGES, type Language, type TextKey } from "./texts";
 
 const INPUT_TEXTS: TextKey[] = ["inputGood", "inputDoubtful", "inputWrong", "inputStale"];
+/** What is over sooner, in messages of one each second, does not push the picture down. */
+const ENDURED = 3;
 const THEMES: Record<Settings["theme"], TextKey> = { auto: "themeAuto", light: "themeLight", dark: "themeDark" };
 
 export class StatusBar {
@@ -17,19 +19,25 @@ export class StatusBar {
   private readonly line = el("p", { class: "pill", attributes: { role: "status" } });
   private readonly input = el("span", { class: "pill" });
   private readonly role = el("span", { class: "pill plain" });
+  /** Messages in a row that said something is wrong. */
+  private badSince = 0;
   /** What the node says about its input, under the bar while it is not good. */
   readonly remedy = el("div", { class: "remedy", attributes: { role: "status" } });
 
   constructor(
     private readonly model: Model,
     private readonly onTheme: () => void,
+    onSetup: () => void,
+    onShare: () => void,
   ) {
-    const settingsRow = el("div", { class: "choices" }, this.languages(), this.themes());
-    this.element = el("header", { class: "bar" }, this.part, this.line, this.input, this.role, settingsRow);
+    const setup = button("check", "setupOpen", onSetup, "square", true);
+    const share = button("share", "share", onShare, "square", true);
+    const right = el("div", { class: "choices" }, setup, share, this.settings());
+    this.element = el("header", { class: "bar" }, this.part, this.line, this.input, this.role, right);
+    model.on(["diagnostics"], () => (this.badSince = (model.input?.level ?? 0) > 0 ? this.badSince + 1 : 0));
     model.on(["state", "line", "diagnostics"], () => this.show());
     onLanguage(() => this.show());
     this.show();
-    applyTheme();
   }
 
   private show(): void {
@@ -44,20 +52,44 @@ export class StatusBar {
     this.input.dataset.level = level === 0 ? "good" : level === 2 ? "bad" : "warn";
     this.role.hidden = state === null;
     if (state !== null) say(this.role, state.role === "operate" ? "roleOperate" : "roleLook");
-    this.remedy.hidden = !(level > 0) || line.kind !== "connected";
+    this.remedy.hidden = this.badSince < ENDURED || !(level > 0) || line.kind !== "connected";
     if (!this.remedy.hidden) this.remedy.replaceChildren(el("strong", {}, `${this.input.textContent}: `), input?.message ?? "");
   }
 
-  private languages(): HTMLElement {
-    const choice = el("select", { label: "language" });
+  /** Language and theme, behind one button. */
+  private settings(): HTMLElement {
+    const row = (text: TextKey, id: string, choice: HTMLSelectElement): HTMLElement => {
+      choice.id = id;
+      return el("div", { class: "field" }, el("label", { text, attributes: { for: id } }), choice);
+    };
+    const popover = el(
+      "div",
+      { class: "popover", attributes: { hidden: "" } },
+      row("language", "language", this.languages()),
+      row("theme", "theme", this.themes()),
+    );
+    const open = button("menu", "settings", () => show(popover.hidden), "square", true);
+    const show = (isShown: boolean): void => {
+      popover.hidden = !isShown;
+      open.setAttribute("aria-expanded", String(isShown));
+    };
+    show(false);
+    const all = el("div", { class: "settings" }, open, popover);
+    all.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
+    document.addEventListener("pointerdown", (event) => all.contains(event.target as Node) || show(false));
+    return all;
+  }
+
+  private languages(): HTMLSelectElement {
+    const choice = el("select");
     for (const name of LANGUAGES) choice.append(el("option", { attributes: { value: name, lang: name } }, LANGUAGE_NAMES[name]));
     choice.value = language();
     choice.addEventListener("change", () => speak(choice.value as Language));
     return choice;
   }
 
-  private themes(): HTMLElement {
-    const choice = el("select", { label: "theme" });
+  private themes(): HTMLSelectElement {
+    const choice = el("select");
     for (const [name, text] of Object.entries(THEMES)) choice.append(el("option", { text, attributes: { value: name } }));
     choice.value = settings.theme;
     choice.addEventListener("change", () => {
@@ -69,6 +101,7 @@ export class StatusBar {
   }
 }
 
-function applyTheme(): void {
+/** Before anything asks the style sheet for a colour. */
+export function applyTheme(): void {
   document.documentElement.dataset.theme = settings.theme;
 }

@@ -87,7 +87,7 @@ export class TipView extends Group {
     const [from, to] = points.map(vector);
     this.state.next = to ?? null;
     this.nextArrow.visible = false;
-    if (from && to) this.nextArrow.place(from, to, from.distanceTo(to) / 9);
+    if (from && to) this.nextArrow.place(from, to, Math.min(from.distanceTo(to) / 9, 0.7 * this.state.radius));
   }
 }
 

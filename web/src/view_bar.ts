@@ -27,6 +27,8 @@ export class ViewBar {
 
 /** Full length of the bar, N; harder presses fill it. */
 const FULL = 10;
+/** A force that nobody measured for so long is not shown any more, ms. */
+const LASTS = 2000;
 /** Above this a stylus presses harder than it should, N. */
 const HARD = 6;
 
@@ -35,16 +37,19 @@ export class ForceBar {
   private readonly fill = el("div", { class: "force-fill" });
   private readonly words = el("span", { class: "force-words" });
   private newtons = 0;
+  private fading: ReturnType<typeof setTimeout> | undefined;
 
   constructor() {
     const bar = el("div", { class: "force-track", attributes: { "aria-hidden": "true" } }, this.fill);
     this.element = el("div", { class: "force", attributes: { hidden: "" } }, this.words, bar);
-    onLanguage(() => this.show(this.newtons));
+    onLanguage(() => this.element.hidden || this.show(this.newtons));
   }
 
   show(newtons: number): void {
     this.newtons = newtons;
     this.element.hidden = false;
+    clearTimeout(this.fading);
+    this.fading = setTimeout(() => (this.element.hidden = true), LASTS);
     this.fill.style.transform = `scaleX(${Math.min(newtons / FULL, 1).toFixed(3)})`;
     this.element.dataset.level = newtons > HARD ? "bad" : "good";
     write(this.words, newtons > HARD ? `${force(newtons)} · ${t("forceHard")}` : `${t("force")} ${force(newtons)}`);

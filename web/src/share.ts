@@ -1,0 +1,40 @@
+/** Lets another device in: a link that is good for one device, to look or to operate. */
+import { button, el } from "./dom";
+import type { Operating } from "./operating";
+
+export class Share {
+  readonly element: HTMLDialogElement;
+  private readonly link = el("output", { class: "link", attributes: { tabindex: "0", hidden: "" } });
+
+  constructor(private readonly operating: Operating) {
+    const close = button("close", "close", () => this.element.close(), "ghost", true);
+    const look = button(null, "shareLook", () => void this.make("look"));
+    const operate = button(null, "shareOperate", () => void this.make("operate"));
+    this.element = el(
+      "dialog",
+      { class: "dialog wide", attributes: { "aria-labelledby": "share-title" } },
+      el("div", { class: "row" }, el("h2", { id: "share-title", text: "share" }), close),
+      el("p", { class: "muted", text: "shareHow" }),
+      el("div", { class: "actions" }, operating.guard(look), operating.guard(operate)),
+      this.link,
+    );
+  }
+
+  show(): void {
+    this.link.hidden = true;
+    this.element.showModal();
+  }
+
+  private async make(role: "look" | "operate"): Promise<void> {
+    try {
+      const { link } = await this.operating.connection.call<{ link: string }>("~/invite", { role });
+      this.link.hidden = false;
+      this.link.textContent = link;
+      // selected, so that one gesture copies it: a page without TLS has no clipboard
+      getSelection()?.selectAllChildren(this.link);
+    } catch (error) {
+      this.element.close();
+      this.operating.notices.failed(error);
+    }
+  }
+}
