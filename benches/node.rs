@@ -2,6 +2,7 @@
 //! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
 //!
 //! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
+//! - `cargo bench --bench node --features web -- pages [FACES]`: the same beside pages: none, one that reads, and one that never reads, by turns.
 //! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process each, over DDS on the loopback
 //!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute. Into `FOLDER` go plots
 //!   and a table of each second.
@@ -9,6 +10,9 @@
 #[path = "node/course.rs"]
 mod course;
 mod memory;
+#[cfg(feature = "web")]
+#[path = "node/pages.rs"]
+mod pages;
 #[path = "node/peer.rs"]
 mod peer;
 
@@ -26,11 +30,12 @@ use touchup::clock::Clock;
 use touchup::io::mesh_file::{MeshUnit, write_mesh};
 use touchup::live::Quantiles;
 use touchup::ros::arguments::NodeConfig;
+use touchup::ros::in_process::OtherParticipants;
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
     HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
 };
-use touchup::ros::node::{INBOX, Prepared, SessionReport};
+use touchup::ros::node::{INBOX, Node, Prepared, SessionReport};
 use touchup::ros::parameters::{ParameterValue, Parameters};
 use touchup::ros::port::{Arrival, Publication};
 use touchup::ros::{dds, in_process};
@@ -102,6 +107,11 @@ fn alone(faces: usize) {
     let (port, world) = in_process::start(inbox, &Clock::system());
     let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
     let node = ready.start(port, received, None).expect("there are threads");
+    print_summary(&slid_over(node, &world));
+}
+
+/// A node is touched for [`SECONDS`] in real time; its report.
+fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
     let mut published = 0;
     let begun = Instant::now();
     for i in 0..1000 * SECONDS {
@@ -116,7 +126,42 @@ fn alone(faces: usize) {
     }
     println!("{:.1} s, {published} messages out", begun.elapsed().as_secs_f64());
     world.arrive_patiently(Arrival::Shutdown);
-    print_summary(&node.join().expect("the result can be written").report);
+    node.join().expect("the result can be written").report
+}
+
+/// The same beside pages, by turns, so that what else the machine does falls on all of them.
+#[cfg(feature = "web")]
+fn beside_pages(faces: usize) {
+    use touchup::ros::web::{NodeFacts, WebParams, start};
+    for turn in 0..3 {
+        for kind in ["no page", "a page that reads", "a page that never reads"] {
+            let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
+            let (inbox, received) = inbox(INBOX, &Clock::system());
+            let (port, world) = in_process::start(inbox.clone(), &Clock::system());
+            let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
+            let address = ([127, 0, 0, 1], 0).into();
+            let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
+            let facts = NodeFacts { scan: "scan.ply".into(), faces, session_folder: folder.path().to_owned() };
+            let (port, page) = start(&params, facts, inbox, ready.whole_mesh(), port, |_| ()).expect("a port is free");
+            let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
+            let _stuck = match kind {
+                "no page" => None,
+                "a page that reads" => {
+                    pages::reading(address);
+                    None
+                }
+                _ => Some(pages::stuck(address)),
+            };
+            let node = ready.start(port, received, None).expect("there are threads");
+            let report = slid_over(node, &world);
+            println!(
+                "{turn} {kind}: work {}; answer {}; dropped {:?}",
+                shown(report.push_ns),
+                shown(report.latency_ns),
+                report.dropped
+            );
+        }
+    }
 }
 
 /// This program again, as another end.
@@ -252,6 +297,8 @@ fn main() {
         }
         Some("viewer") => write(&peer::view(number(0, 0) as u16), path),
         Some("late") => peer::join_late(number(0, 0) as u16),
+        #[cfg(feature = "web")]
+        Some("pages") => beside_pages(number(0, 1_000_000)),
         _ if numbers.is_empty() => [100_000, 1_000_000].into_iter().for_each(alone),
         _ => numbers.into_iter().for_each(alone),
     }

@@ -28,7 +28,7 @@ logs=$target/test-logs
 venv=$target/python
 passed=0 failed=0 skipped=0
 reasons=() stages=()
-ur=()
+features=() has_ur=
 rm -rf "$logs" && mkdir -p "$logs/results" || exit 1
 # what a slow proof measured goes here as a file of Markdown
 [ -z "$is_full" ] || export TOUCHUP_RESULTS=$logs/results
@@ -57,12 +57,15 @@ python_is_ready() { wait "$1" || { tail -n 5 "$logs/pip.log" >&2; return 1; }; }
 
 # a UR arm needs a Python to link with, its shared library and what finds that; the tests install ur-rtde by themselves
 ur_feature() {
-  PYO3_PYTHON=$(command -v python3) && export PYO3_PYTHON && python3 - <<'PYTHON' && ur=(--features ur)
+  PYO3_PYTHON=$(command -v python3) && export PYO3_PYTHON && python3 - <<'PYTHON' && features+=(--features ur) && has_ur=yes
 import os, sys, sysconfig
 folder, library = map(sysconfig.get_config_var, ("LIBDIR", "LDLIBRARY"))
 sys.exit(not (library.endswith(".so") and os.path.exists(os.path.join(folder, library))))
 PYTHON
 }
+
+# the operator's page is built by npm; the tests drive it in a browser
+web_feature() { command -v npm > /dev/null && features+=(--features web); }
 
 # lines of passing tests, and what they print, go into the log alone
 without_passing() {
@@ -85,7 +88,7 @@ for crate in crates/*; do unoptimised+=(--config "profile.dev.package.$(basename
 # what tests, then the program and the stand-in for a controller, which by then are all but built: the other way round one core
 # waits for the last crates of the program
 build_tests() {
-  cargo test --workspace --no-run "${ur[@]}" "${programs[@]}" && cargo build "${ur[@]}" --bins --examples || fail "the tests do not build"
+  cargo test --workspace --no-run "${features[@]}" "${programs[@]}" && cargo build "${features[@]}" --bins --examples || fail "the tests do not build"
 }
 
 # cargo_tests LOG ARGUMENT...
@@ -107,7 +110,7 @@ cargo_tests() {
 
 python_tests() {
   export TOUCHUP_BIN=$target/debug/touchup
-  if [ "${#ur[@]}" -gt 0 ]; then
+  if [ -n "$has_ur" ]; then
     # of the Rust tests: with a UR arm, and the stand-in for its controller
     export TOUCHUP_UR_BIN=$target/debug/touchup TOUCHUP_UR_CONTROLLER=$target/debug/examples/ur_controller
   fi
@@ -155,13 +158,14 @@ PYTHON
 python_environment > "$logs/pip.log" 2>&1 &
 packages=$!
 ur_feature || skip "$(cat tests/ur/*.rs | grep -c '^#\[test\]')" "a UR arm needs the shared library of Python (Debian: apt-get install python3-dev)"
+web_feature || skip "$(cat src/ros/web/*.rs | grep -c '^ *#\[test\]')" "the operator's page is built by npm (Debian: apt-get install npm)"
 programs=(--test rooms --test report)
-[ "${#ur[@]}" -eq 0 ] || programs+=(--test ur)
+[ -z "$has_ur" ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
-stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${ur[@]}" "${programs[@]}"
+stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${features[@]}" "${programs[@]}"
 # with them the node on r2r, of which without ROS only its parts can run; a program of fuzz/ would fuzz for ever
-stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace --exclude touchup-fuzz "${unoptimised[@]}" "${ur[@]}" --features r2r-check --lib --bins
-stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${ur[@]}" --doc
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace --exclude touchup-fuzz "${unoptimised[@]}" "${features[@]}" --features r2r-check --lib --bins
+stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${features[@]}" --doc
 stage "Fuzzing" fuzz_targets
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"

@@ -13,7 +13,7 @@ use super::compare::{CompareArguments, compared};
 use super::demo_robot::demo_robot;
 use super::found::FoundTable;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use super::page::on_page;
+use super::page::{on_page, parameters_of};
 use super::progress::WorkProgress;
 use super::refine::{RefineArguments, RefineSummary, Refined};
 use super::simulate::{Simulated, write_simulation};
@@ -30,7 +30,9 @@ use crate::mesh::{FaceTree, MeshError, TriMesh};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::replay::Recording;
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::ros::parameters::{ParameterValue, Parameters};
+use crate::ros::node::NodeEnd;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::parameters::ParameterValue;
 use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality, plan_demo};
 
 /// Largest distance of the written plate's round walls from circles, m.
@@ -82,18 +84,12 @@ reported! {
 /// The touching as an operator sees it, live on the page.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 fn demo_on_page(web: &WebFlags, out: &std::path::Path, tip_radius: f64) -> Result<Losses, CliError> {
-    let word = |path: PathBuf| ParameterValue::String(path.display().to_string());
-    let mut parameters = Parameters::default();
-    let settings = [
-        ("scan", word(out.join("scan.ply"))),
-        ("tip_radius_mm", ParameterValue::Double(tip_radius * 1e3)),
-        ("session_folder", word(out.join("sessions"))),
-    ];
-    for (name, value) in settings {
-        parameters.set(name, &value).map_err(CliError::usage)?;
-    }
+    let mut parameters = parameters_of(&out.join("scan.ply"), MeshUnit::Millimetre, &out.join("sessions"))?;
+    parameters.set("tip_radius_mm", &ParameterValue::Double(tip_radius * 1e3)).map_err(CliError::usage)?;
     let recording = Recording::open(&out.join("touch.mcap"), &Topics::default(), StampSource::Header)?;
-    on_page(web, parameters, recording)
+    let NodeEnd { folder, report } = on_page(web, parameters, recording, None)?;
+    print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
+    Ok(Losses::new())
 }
 
 pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
+use super::page::path;
 use super::signals::{SignalKind, on_each_signal};
 use super::told::{ToldBy, ToldNumbers};
 use super::web::WebFlags;
@@ -104,9 +105,7 @@ impl NodeArguments {
     /// The flag overrides files of parameters, which may name a scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
         let Some(scene) = &self.scene else { return Ok(()) };
-        let why = format!("--scene {}: parameters of ROS are UTF-8, rename the file", scene.display());
-        let path = scene.to_str().ok_or_else(|| CliError::usage(why))?;
-        config.parameters.set("scene", &ParameterValue::String(path.to_owned())).map_err(CliError::usage)
+        config.parameters.set("scene", &path(scene)?).map_err(CliError::usage)
     }
 }
 

@@ -1,26 +1,34 @@
 //! A recording on the operator's page: a node without a network takes it as it would take a stylus.
 
+use std::path::Path;
 use std::thread::{Builder, sleep};
 use std::time::Duration;
 
 use super::replay::play;
 use super::signals::{SignalKind, on_each_signal};
 use super::web::WebFlags;
-use super::{CliError, Losses, notify, print_result};
+use super::{CliError, notify};
 use crate::clock::Clock;
+use crate::io::mesh_file::MeshUnit;
 use crate::replay::Recording;
 use crate::ros::in_process;
 use crate::ros::inbox::inbox;
 use crate::ros::node::{INBOX, NodeEnd, NodeError, Prepared};
-use crate::ros::parameters::Parameters;
+use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Arrival;
+use crate::stylus::MarkerFilter;
 
 /// Period of the look for a page.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Plays a recording in real time as soon as a page is open; the node goes on until a signal ends it, so that what was found can be
-/// looked at and saved.
-pub(super) fn on_page(web: &WebFlags, parameters: Parameters, recording: Recording) -> Result<Losses, CliError> {
+/// looked at and saved. What it leaves behind.
+pub(super) fn on_page(
+    web: &WebFlags,
+    parameters: Parameters,
+    recording: Recording,
+    markers: Option<MarkerFilter>,
+) -> Result<NodeEnd, CliError> {
     let ready = Prepared::new(parameters)?;
     let clock = Clock::system();
     let (inbox, arrivals) = inbox(INBOX, &clock);
@@ -43,7 +51,7 @@ pub(super) fn on_page(web: &WebFlags, parameters: Parameters, recording: Recordi
         while page.as_ref().is_some_and(|page| !page.was_opened()) {
             sleep(LOOK);
         }
-        match play(recording, None, 1.0, "stylus", &touching) {
+        match play(recording, markers, 1.0, "stylus", &touching) {
             Ok(_) => notify("the recording is at its end; Ctrl-C saves and ends the session"),
             Err(error) => notify(&error.message),
         }
@@ -51,8 +59,25 @@ pub(super) fn on_page(web: &WebFlags, parameters: Parameters, recording: Recordi
         page
     };
     let touching = Builder::new().name("touching".to_owned()).spawn(touch).map_err(NodeError::NoThread)?;
-    let NodeEnd { folder, report } = running.join()?;
+    let end = running.join()?;
     drop(touching);
-    print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
-    Ok(Losses::new())
+    Ok(end)
+}
+
+/// Parameters of a node on a scan.
+///
+/// - `sessions`: folder in which sessions lie.
+pub(super) fn parameters_of(scan: &Path, unit: MeshUnit, sessions: &Path) -> Result<Parameters, CliError> {
+    let mut parameters = Parameters::default();
+    let unit = ParameterValue::String(unit.name().to_owned());
+    for (name, value) in [("scan", path(scan)?), ("mesh_unit", unit), ("session_folder", path(sessions)?)] {
+        parameters.set(name, &value).map_err(CliError::usage)?;
+    }
+    Ok(parameters)
+}
+
+/// A path as a parameter.
+pub(super) fn path(path: &Path) -> Result<ParameterValue, CliError> {
+    let why = || CliError::usage(format!("{}: parameters of ROS are UTF-8, rename the file", path.display()));
+    Ok(ParameterValue::String(path.to_str().ok_or_else(why)?.to_owned()))
 }

@@ -13,9 +13,13 @@ use tracing::{debug, warn};
 
 use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::page::{on_page, parameters_of, path};
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
 use super::told::{ToldFlags, ToldNumbers};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::web::WebFlags;
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::{RefineError, Refiner};
@@ -26,6 +30,8 @@ use crate::live::{Latencies, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::reconstruct::CloudSummary;
 use crate::replay::{Recording, Replayed, each_sample, marker_filter};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::node::NodeEnd;
 use crate::scan::{Scan, read_scan};
 use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
@@ -74,6 +80,10 @@ pub(super) struct RefineArguments {
     /// the same
     #[arg(long)]
     live: bool,
+    /// With --live: the touching is shown on the operator's page while it is replayed, and what is undone there is left out
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[command(flatten)]
+    web: WebFlags,
     /// Output: the features of the refined mesh, measured by the touches, as JSON
     #[arg(long, value_name = "JSON")]
     features_out: Option<PathBuf>,
@@ -183,6 +193,8 @@ const NO_PATCH: &str =
 /// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let arguments = arguments.clone().completed()?;
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    let arguments = arguments.after_the_page()?;
     let Refined { repair, summary, losses } = arguments.refined()?;
     print_report(arguments.json, &summary, || {
         let details =
@@ -255,6 +267,34 @@ impl RefineArguments {
             (self.scan, self.mesh_unit) = scan.ok_or_else(|| CliError::usage(NO_SCAN))?;
         }
         Ok(self)
+    }
+
+    /// What is left to be refined when the page was closed: the session that was made on it, without what was undone there.
+    #[cfg(any(feature = "ros", feature = "r2r"))]
+    fn after_the_page(self) -> Result<Self, CliError> {
+        if !self.web.is_wanted() {
+            return Ok(self);
+        }
+        require(self.live, "--web shows what is replayed in real time: say --live as well")?;
+        require(self.mode.is_none_or(|mode| mode == Mode::Robust), "--web shows the robust method alone")?;
+        require(self.strokes.is_empty(), "--web begins a session: resume the other one without it")?;
+        let (scene, _) = self.scene()?;
+        self.check_out()?;
+        let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
+        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
+        let recording =
+            Recording::open(&self.bag, &Topics { pose, wrench, markers: self.markers_topic.clone() }, self.stamp)?;
+        let folder = self.out.parent().unwrap_or(Path::new("")).join("sessions");
+        let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
+        // files that the scene names are relative to its folder
+        let beside = self.scene.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
+        let mut text = tempfile::Builder::new().suffix(".yaml").tempfile_in(beside.unwrap_or(Path::new(".")))?;
+        std::io::Write::write_all(&mut text, self.told.scene_text(self.scene.as_deref())?.as_bytes())?;
+        parameters.set("scene", &path(text.path())?).map_err(CliError::usage)?;
+        let NodeEnd { folder, .. } = on_page(&self.web, parameters, recording, markers)?;
+        let Self { out, features_out, touches_out, registration, force, verbose, json, .. } = self;
+        let session = Self { resume: Some(folder), out, registration, force, verbose, json, ..Self::default() };
+        Self { features_out, touches_out, ..session }.completed()
     }
 
     /// Reads, replays and writes.

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::CliError;
-use crate::scene::Scene;
+use crate::scene::{Scene, Setting};
 
 /// The flags that tell of tip and scan, over the scene.
 #[derive(Clone, Debug, Default, Args)]
@@ -33,7 +33,17 @@ impl ToldFlags {
             Some(path) => Scene::read_with_text(path)?,
             None => (Scene::default(), String::new()),
         };
-        scene.tell_radius(&yaml, self.tip_radius_mm)?;
+        self.tell(&mut scene, &yaml)?;
+        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
+        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
+        Ok((scene, told))
+    }
+}
+
+impl ToldFlags {
+    /// Sets what the flags tell.
+    fn tell(&self, scene: &mut Scene, yaml: &str) -> Result<(), CliError> {
+        scene.tell_radius(yaml, self.tip_radius_mm)?;
         if let Some(stiffness) = self.stiffness_n_per_mm {
             scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness * 1e3);
         }
@@ -41,10 +51,28 @@ impl ToldFlags {
             scene.scan.get_or_insert_default().quality.noise = noise_mm / 1e3;
         }
         // the file was in range when it was read: what is not now came by a flag
-        scene.validate().map_err(CliError::usage)?;
-        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
-        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
-        Ok((scene, told))
+        scene.validate().map_err(CliError::usage)
+    }
+
+    /// The text of a scene, or of the usual one, with what the flags tell.
+    ///
+    /// # Errors
+    /// As [`Self::scene`], and for a scene whose text is of a form in which nothing can be set.
+    pub fn scene_text(&self, path: Option<&Path>) -> Result<String, CliError> {
+        let yaml = match path {
+            Some(path) => Scene::read_with_text(path)?.1,
+            None => Scene::template_without_radius(),
+        };
+        let mut expected = Scene::from_yaml(&yaml)?;
+        self.tell(&mut expected, &yaml)?;
+        let told = [
+            ("tip.radius_mm", self.tip_radius_mm),
+            ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
+            ("scan.noise_mm", self.scan_noise_mm),
+        ];
+        let settings: Vec<_> =
+            told.into_iter().filter_map(|(key, number)| Some(Setting::scalar(key, number?))).collect();
+        Ok(Scene::edited(&yaml, &settings, "given by flags", &expected)?)
     }
 }
 

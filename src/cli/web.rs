@@ -34,6 +34,9 @@ pub(super) struct WebFlags {
     /// Name of this machine by which the page may be called, beside its address; can be given again
     #[arg(long, value_name = "NAME", requires = "web")]
     web_name: Vec<String>,
+    /// Lets in by link alone also on this machine, where else every user is
+    #[arg(long, requires = "web")]
+    web_links: bool,
     /// Serves the page by TLS with this certificate chain, PEM
     #[arg(long, value_name = "PEM", requires_all = ["web", "web_key"])]
     web_certificate: Option<PathBuf>,
@@ -80,7 +83,8 @@ impl WebFlags {
         let (scan, faces) = ready.scan();
         let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let facts = NodeFacts { scan: scan.to_owned(), faces, session_folder };
-        let params = WebParams { address, names: self.web_name.clone(), certificate };
+        let by_link = self.web_links || !address.ip().is_loopback();
+        let params = WebParams { address, names: self.web_name.clone(), by_link, certificate };
         let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;
         notify(&format!("page: {}", server.url()));
         server.invitations().iter().for_each(|invitation| notify(invitation));

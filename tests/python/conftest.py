@@ -6,6 +6,7 @@ without; files that need its Python packages are not read then.
 """
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -75,3 +76,18 @@ def shared():
 def judge(shared):
     """Path of the judge's script."""
     return shared / "judge" / "judge.py"
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Debian's chromium, for the tests of one process."""
+    from browser import ARGUMENTS
+    from playwright.sync_api import sync_playwright
+
+    program = shutil.which("chromium")
+    if not program:
+        pytest.skip("the page is shown by a browser (Debian: apt-get install chromium)")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=ARGUMENTS)
+        yield browser
+        browser.close()

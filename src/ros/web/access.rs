@@ -64,7 +64,8 @@ pub(super) struct Access {
 impl Access {
     /// - `address`: as it is listened to; with every address of the machine, links name `names`.
     /// - `names`: other names and addresses of this machine by which the page may be called.
-    pub fn new(address: SocketAddr, names: &[String], is_tls: bool) -> Self {
+    /// - `by_link`: pages are let in by link alone.
+    pub fn new(address: SocketAddr, names: &[String], by_link: bool, is_tls: bool) -> Self {
         let (scheme, usual) = if is_tls { ("https", 443) } else { ("http", 80) };
         let mut named: Vec<String> = names.to_vec();
         if address.ip().is_loopback() || address.ip().is_unspecified() {
@@ -81,7 +82,7 @@ impl Access {
         Self {
             hosts,
             scheme,
-            needs_cookie: !address.ip().is_loopback(),
+            needs_cookie: by_link,
             cookie_name: format!("touchup_{port}"),
             links: Mutex::default(),
             cookies: Mutex::default(),
@@ -172,7 +173,8 @@ mod tests {
     use super::*;
 
     fn access(address: &str) -> Access {
-        Access::new(address.parse().unwrap(), &["cell.local".to_owned()], false)
+        let address: SocketAddr = address.parse().unwrap();
+        Access::new(address, &["cell.local".to_owned()], !address.ip().is_loopback(), false)
     }
 
     #[test]
@@ -222,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn on_loopback_everybody_operates() {
+    fn where_no_link_is_needed_everybody_operates() {
         assert_eq!(access("127.0.0.1:8321").role(""), Some(Role::Operate));
     }
 }

@@ -35,14 +35,23 @@ const PROTOCOL: &str = "touchup.v1";
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; \
                       manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// For how long a browser keeps a file of the page: whose name has a checksum in it, and others.
+const KEPT: &str = "public, max-age=31536000, immutable";
+const SEEN_AGAIN: &str = "no-cache";
+
 /// All that is answered.
 pub(super) fn router(site: Arc<Site>) -> Router {
     let checked = from_fn_with_state(Arc::clone(&site), check);
     Router::new()
-        .route("/", get(|headers: HeaderMap| async move { asset("index.html", &headers) }))
+        .route("/", get(|headers: HeaderMap| async move { asset("index.html", SEEN_AGAIN, &headers) }))
         .route(
             "/assets/{name}",
-            get(|Path(name): Path<String>, headers: HeaderMap| async move { asset(&name, &headers) }),
+            get(|Path(name): Path<String>, headers: HeaderMap| async move { asset(&name, KEPT, &headers) }),
+        )
+        // names of these have no checksum in them
+        .route(
+            "/{name}",
+            get(|Path(name): Path<String>, headers: HeaderMap| async move { asset(&name, SEEN_AGAIN, &headers) }),
         )
         .route("/pair", get(pair))
         .route("/ws", get(upgrade))
@@ -105,12 +114,10 @@ fn role_of(site: &Site, headers: &HeaderMap) -> Result<Role, Box<Response>> {
     site.access.role(cookies).ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
 }
 
-fn asset(name: &str, headers: &HeaderMap) -> Response {
+fn asset(name: &str, cache: &'static str, headers: &HeaderMap) -> Response {
     let Some(file) = PAGE.iter().find(|file| file.name == name) else {
         return refusal(StatusCode::NOT_FOUND, "the page has no such file");
     };
-    // names of all but the first have a checksum in them
-    let cache = if name == "index.html" { "no-cache" } else { "public, max-age=31536000, immutable" };
     let head =
         [(header::CONTENT_TYPE, file.content_type), (header::CACHE_CONTROL, cache), (header::VARY, "accept-encoding")];
     let accepts_gzip = headers

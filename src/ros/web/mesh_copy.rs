@@ -29,12 +29,6 @@ struct Lacking {
     part: u32,
 }
 
-/// A whole state on its way, as somebody asked for it or a session began; changes that come meanwhile wait for its end.
-#[derive(Debug, Default)]
-struct Coming {
-    later: Vec<MeshPatch>,
-}
-
 /// The mesh, and who lacks what of it.
 #[derive(Debug, Default)]
 pub(super) struct MeshCopy {
@@ -51,21 +45,26 @@ pub(super) struct MeshCopy {
     /// vertices and faces in the version
     counts: [u32; 2],
     pages: BTreeMap<PageId, Lacking>,
-    coming: Option<Coming>,
+    /// the whole state of a new session is on its way: until its last part the mesh is none
+    is_coming: bool,
+    /// changes that wait for the end of that
+    later: Vec<MeshPatch>,
+    /// the first parts of a change
+    begun: Vec<MeshPatch>,
 }
 
 impl MeshCopy {
     /// Takes up what the node publishes, in its order.
     pub fn take(&mut self, patch: MeshPatch) {
-        let is_whole = patch.base_version == 0;
         let is_new = self.session != patch.session;
-        match &mut self.coming {
-            // of another session than that which comes, or of a whole state that only others need
-            _ if is_whole && is_new => self.begin(patch),
-            Some(_) if is_whole => self.part_of_whole(patch),
-            Some(coming) => coming.later.push(patch),
-            None if is_whole || is_new => {}
-            None => self.change(&patch),
+        match patch.base_version {
+            0 if is_new => self.begin(patch),
+            0 if self.is_coming => self.part_of_whole(&patch),
+            // of another session, or a whole state that only others need
+            0 => {}
+            _ if is_new => {}
+            _ if self.is_coming => self.later.push(patch),
+            _ => self.part_of_change(patch),
         }
     }
 
@@ -73,20 +72,30 @@ impl MeshCopy {
         let pages = std::mem::take(&mut self.pages);
         let pages = pages.into_keys().map(|page| (page, Lacking::default())).collect();
         let (frame, session) = (patch.header.frame_id.clone(), patch.session.clone());
-        *self = Self { frame, session, pages, coming: Some(Coming::default()), ..Self::default() };
-        self.part_of_whole(patch);
+        *self = Self { frame, session, pages, is_coming: true, ..Self::default() };
+        self.part_of_whole(&patch);
     }
 
-    fn part_of_whole(&mut self, patch: MeshPatch) {
-        self.change(&patch);
-        if patch.part + 1 == patch.part_count
-            && let Some(coming) = self.coming.take()
-        {
-            coming.later.iter().for_each(|patch| self.change(patch));
+    fn part_of_whole(&mut self, patch: &MeshPatch) {
+        self.apply(patch);
+        if patch.part + 1 == patch.part_count {
+            self.is_coming = false;
+            for patch in std::mem::take(&mut self.later) {
+                self.part_of_change(patch);
+            }
         }
     }
 
-    fn change(&mut self, patch: &MeshPatch) {
+    /// A change is taken up as a whole, so that the mesh is that of a version whenever somebody reads it.
+    fn part_of_change(&mut self, patch: MeshPatch) {
+        let is_last = patch.part + 1 == patch.part_count;
+        self.begun.push(patch);
+        if is_last {
+            std::mem::take(&mut self.begun).iter().for_each(|patch| self.apply(patch));
+        }
+    }
+
+    fn apply(&mut self, patch: &MeshPatch) {
         for &face in &patch.removed_faces {
             self.set_face(face, NO_FACE);
         }
@@ -153,6 +162,9 @@ impl MeshCopy {
     ///
     /// In parts, a state may change between them: a face may name a vertex that comes with the next.
     pub fn next_for(&mut self, page: PageId) -> Option<MeshPatch> {
+        if self.is_coming {
+            return None;
+        }
         let Self { pages, positions, variance, support, corners, .. } = self;
         let lacking = pages.get_mut(&page)?;
         let is_first_whole = lacking.version == 0 && lacking.part == 0;
@@ -296,6 +308,21 @@ mod tests {
         page.catch_up(&mut copy, 1);
         assert_eq!((page.session.as_str(), page.vertices[&2]), ("b", [7.0; 3]));
         assert_eq!(page.faces.len(), 1);
+    }
+
+    #[test]
+    fn a_change_in_parts_is_taken_up_with_its_last_part() {
+        let mut copy = MeshCopy::default();
+        copy.take(triangle("a"));
+        copy.join(1);
+        let mut page = Page::default();
+        page.catch_up(&mut copy, 1);
+        let part = |part, x| MeshPatch { part, part_count: 2, ..patch("a", [1, 2], &[(part, x)], &[]) };
+        copy.take(part(0, 3.0));
+        assert!(copy.next_for(1).is_none());
+        copy.take(part(1, 4.0));
+        page.catch_up(&mut copy, 1);
+        assert_eq!((page.vertices[&0], page.vertices[&1]), ([3.0; 3], [4.0; 3]));
     }
 
     #[test]

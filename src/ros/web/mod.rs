@@ -75,6 +75,8 @@ pub struct WebParams {
     pub address: SocketAddr,
     /// names of this machine by which the page may be called, beside the address
     pub names: Vec<String>,
+    /// lets in by link alone; otherwise everybody who reaches the address operates
+    pub by_link: bool,
     /// TLS by it; `None`: no TLS
     pub certificate: Option<Certificate>,
 }
@@ -233,7 +235,7 @@ impl WebServer {
         self.site.pages_so_far.load(Ordering::Relaxed) > 0
     }
 
-    /// Links by which pages are let in, each with what it gives; none on loopback, where everybody is.
+    /// Links by which pages are let in, each with what it gives; none where everybody is.
     pub fn invitations(&self) -> &[String] {
         &self.invitations
     }
@@ -270,7 +272,7 @@ pub fn start(
     let listener = listener.map_err(|source| WebError::Address { address: params.address, source })?;
     let address = listener.local_addr()?;
     let names: Vec<String> = params.names.iter().cloned().chain(own_address(address)).collect();
-    let access = Access::new(address, &names, tls.is_some());
+    let access = Access::new(address, &names, params.by_link, tls.is_some());
     let name = names.first().cloned().unwrap_or_else(|| in_a_link(address.ip()));
     let base = format!("{}://{name}:{}", access.scheme(), address.port());
     let file = facts.scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();

@@ -1,0 +1,173 @@
+"""The operator's page in a real browser: its picture against rays that are cast onto the saved mesh, live changes, lost connections,
+roles, holding a button for an arm to move, and what axe-core finds."""
+
+import json
+import re
+import time
+
+import numpy
+import pytest
+import trimesh
+from browser import DESKTOP, LANDSCAPE, PORTRAIT, first_hits, opened, picture, rays, wait_until
+from conftest import ROOT
+from ros_process import Process, play
+from test_web import links
+from web_page import PageNode
+
+# the part is 0.07 m from 700 px wide
+HALF_A_PIXEL_M = 5e-5
+AXE = ROOT / "web/node_modules/axe-core/axe.min.js"
+
+
+@pytest.fixture(scope="module")
+def touched(touchup_bin, demo_folder, tmp_path_factory):
+    """A node after the recording of the demo, at rest."""
+    folder = tmp_path_factory.mktemp("touched")
+    with PageNode(touchup_bin, folder, demo_folder / "scan.ply", "--web-links") as node:
+        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 8, domain=node.domain)
+        yield node
+
+
+def page_of(browser, node, role="operate", **options):
+    """A page that is let in by a new link."""
+    count = len(links(node, role))
+    page = opened(browser, node.url.rstrip("/") + links(node, role)[-1], **options)
+    node.wait_for(lambda: len(links(node, role)) > count)
+    return page
+
+
+def call(page, service, /, **request):
+    """Calls a service over a socket of the page's own origin; the answer."""
+    return page.evaluate(
+        """([name, request]) => new Promise((resolve, reject) => {
+            const socket = new WebSocket(location.origin.replace("http", "ws") + "/ws", "touchup.v1");
+            socket.onopen = () => socket.send(JSON.stringify({ id: "test", call: name, request }));
+            socket.onerror = () => reject(new Error("no socket"));
+            socket.onmessage = ({ data }) => {
+                const answer = typeof data === "string" ? JSON.parse(data) : {};
+                if (answer.id === "test") { socket.close(); resolve(answer); }
+            };
+        })""",
+        [service, request],
+    )
+
+
+def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
+    page = page_of(browser, touched)
+    # at rest the mesh of every follower is what is saved
+    touched.wait_for(lambda: call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]["mesh_version"] > 0)
+    saved = call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]
+    wait_until(page, f"touchup.version() >= {saved['mesh_version']}")
+    page.get_by_role("button", name="Whole part").click()
+    # what lies over the picture is no matter of the mesh
+    page.evaluate("document.querySelectorAll('.picture > :not(canvas)').forEach((each) => (each.style.display = 'none'))")
+    shot, box = picture(page)
+    mesh = trimesh.load(touched.session / "seen.ply", process=False)
+    support = numpy.asarray(mesh.metadata["_ply_raw"]["vertex"]["data"]["support"]).ravel()
+    assert page.evaluate("touchup.faceCount()") == len(mesh.faces)
+
+    random = numpy.random.default_rng(7)
+    points = random.uniform([20, 20], [box["width"] - 20, box["height"] - 20], (1500, 2)).round() + 0.5
+    hits = first_hits(*rays(page, points, box), mesh.triangles * 1e-3)
+    at = (points + [box["x"], box["y"]]).astype(int)
+    seen = shot[at[:, 1], at[:, 0]]
+    background = shot[int(box["y"] + box["height"] // 2), int(box["x"] + 3)]
+    is_seen = (numpy.abs(seen - background) > 8).any(1)
+    assert (hits >= 0).sum() > 200 and (hits < 0).sum() > 200
+    assert (is_seen == (hits >= 0)).mean() > 0.985
+
+    # one colour for each kind of support: faces all of whose corners are of one kind
+    corners = support[mesh.faces[hits]]
+    is_one = (hits >= 0) & (corners.min(1) == corners.max(1))
+    red, green, blue = seen.T
+    shown = numpy.select([green > 1.3 * numpy.maximum(red, blue), blue > 1.25 * red, red > 1.3 * blue], [1, 2, 3], 0)
+    same = shown[is_one] == corners[is_one, 0]
+    assert set(corners[is_one, 0]) >= {0, 1}, "scan and touched are in the picture"
+    assert same.mean() > 0.95, same.mean()
+    assert page.wrong == []
+    page.context.close()
+
+
+def test_a_pick_is_the_first_face_that_a_ray_meets(browser, touched):
+    page = page_of(browser, touched)
+    page.evaluate("touchup.idle()")
+    mesh = trimesh.load(touched.session / "seen.ply", process=False)
+    box = page.locator("canvas").first.bounding_box()
+    points = numpy.random.default_rng(3).uniform([0.3, 0.3], [0.7, 0.7], (40, 2)) * [box["width"], box["height"]]
+    origins, directions = rays(page, points, box)
+    hits = first_hits(origins, directions, mesh.triangles * 1e-3)
+    for point, hit, origin, direction in zip(points, hits, origins, directions, strict=True):
+        picked = page.evaluate("([x, y]) => touchup.pick(x, y)", point.tolist())
+        assert (picked is None) == (hit < 0)
+        if picked:
+            # on the ray, to half a pixel, and in the plane of the triangle
+            place = numpy.array(picked["point"])
+            assert numpy.linalg.norm(numpy.cross(place - origin, direction)) < HALF_A_PIXEL_M
+            assert abs((place - mesh.triangles[hit][0] * 1e-3) @ mesh.face_normals[hit]) < HALF_A_PIXEL_M
+    page.context.close()
+
+
+def test_features_are_listed_with_their_uncertainty(browser, touched):
+    page = page_of(browser, touched)
+    page.get_by_text("Boss").first.wait_for()
+    text = page.locator("body").inner_text()
+    # the plate of the demo, as it was made: hole and boss
+    found = {float(value): float(u) for value, u in re.findall(r"Ø\s(\d+\.\d+)\s±\s(\d+\.\d+)", text)}
+    for true in [8.0, 6.0, 10.0]:
+        value = min(found, key=lambda value: abs(value - true))
+        assert abs(value - true) < 0.03 and 0.001 < found[value] < 0.1, found
+    page.context.close()
+
+
+def test_every_size_theme_and_language_has_no_serious_fault_for_who_sees_or_hears_otherwise(browser, touched, tmp_path):
+    if not AXE.is_file():
+        pytest.skip("axe-core is not there: web/check installs it")
+    for size, scheme, language in [(DESKTOP, "light", "en"), (LANDSCAPE, "dark", "de"), (PORTRAIT, "light", "es")]:
+        page = page_of(browser, touched, size=size, language=language, color_scheme=scheme, bypass_csp=True)
+        page.evaluate("touchup.idle()")
+        page.screenshot(path=tmp_path / f"{language}.png")
+        page.add_script_tag(path=AXE)
+        found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+        serious = [(one["id"], one["nodes"][0]["html"]) for one in found if one["impact"] in ("serious", "critical")]
+        assert serious == [], (language, serious)
+        assert page.evaluate("document.documentElement.lang") == language
+        # nothing is wider than the window
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        page.context.close()
+
+
+def test_who_only_looks_sees_the_same_and_changes_nothing(browser, touched):
+    one, other = page_of(browser, touched, role="look"), page_of(browser, touched)
+    assert one.evaluate("touchup.faceCount()") == other.evaluate("touchup.faceCount()")
+    assert one.get_by_role("button", name="Undo").is_disabled() and other.get_by_role("button", name="Undo").is_enabled()
+    other.get_by_role("button", name="Pause").click()
+    one.get_by_text("paused").first.wait_for()
+    other.get_by_role("button", name="Continue").click()
+    one.get_by_text("paused").first.wait_for(state="detached")
+    for page in (one, other):
+        assert page.wrong == []
+        page.context.close()
+
+
+def test_changes_come_while_it_is_touched_and_a_page_that_was_away_catches_up(browser, touchup_bin, demo_folder, tmp_path):
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply") as node:
+        page = opened(browser, node.url)
+        before = page.evaluate("touchup.version()")
+        with Process(touchup_bin, "replay", demo_folder / "touch.mcap", domain=node.domain) as player:
+            wait_until(page, f"touchup.version() > {before} && touchup.tip() !== null")
+            page.context.set_offline(True)
+            time.sleep(5)
+            away = page.evaluate("touchup.version()")
+            page.context.set_offline(False)
+            wait_until(page, f"touchup.version() > {away}")
+            player.process.kill()
+        # the node ends and another one begins at the same address
+        assert node.end() in (0, 4), node.text()
+        page.get_by_text("trying again").first.wait_for()
+        port = node.url.rsplit(":", 1)[1]
+        folder = tmp_path / "again"
+        folder.mkdir()
+        with PageNode(touchup_bin, folder, demo_folder / "scan.ply", address=f"127.0.0.1:{port}") as again:
+            wait_until(page, f"touchup.session() === {json.dumps(again.session.name)}")
+            assert page.wrong == []
+        page.context.close()

@@ -1,0 +1,266 @@
+"""Who may see and do what on the operator's page, and whether what it is sent is the node's mesh; without a browser."""
+
+import http.client
+import json
+import re
+import socket
+import ssl
+import subprocess
+import time
+from urllib.parse import urlsplit
+
+import numpy
+import pytest
+import trimesh
+from ros_process import play
+from scipy.spatial import cKDTree
+from web_page import PROTOCOL, PageNode, Socket
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+
+def ask(url, path, method="GET", context=None, **headers):
+    """A request with exactly these headers besides Host; its status, headers and text."""
+    place = urlsplit(url)
+    if place.scheme == "https":
+        connection = http.client.HTTPSConnection(place.hostname, place.port, timeout=30, context=context)
+    else:
+        connection = http.client.HTTPConnection(place.hostname, place.port, timeout=30)
+    headers = {name.replace("_", "-"): value for name, value in headers.items()}
+    connection.putrequest(method, path, skip_host="Host" in headers, skip_accept_encoding=True)
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    text = answer.read()
+    connection.close()
+    return answer.status, dict(answer.getheaders()), text
+
+
+@pytest.fixture(scope="module")
+def node(touchup_bin, demo_folder, tmp_path_factory):
+    """A node whose page everybody on this machine may use."""
+    with PageNode(touchup_bin, tmp_path_factory.mktemp("open"), demo_folder / "scan.ply") as node:
+        yield node
+
+
+@pytest.fixture(scope="module")
+def closed(touchup_bin, demo_folder, tmp_path_factory):
+    """A node whose page lets in by link."""
+    with PageNode(touchup_bin, tmp_path_factory.mktemp("closed"), demo_folder / "scan.ply", "--web-links") as node:
+        yield node
+
+
+def links(node, role):
+    """The links that a node has printed for a role, the newest last."""
+    return [found[1] for line in node.err if (found := re.search(rf"may {role} by \S+(/pair\?token=\w+)", line))]
+
+
+def let_in(node, role):
+    """The cookie that the newest link for a role gives."""
+    count = len(links(node, role))
+    status, headers, _ = ask(node.url, links(node, role)[-1])
+    assert (status, headers["location"]) == (303, "/")
+    # who comes next has another link
+    node.wait_for(lambda: len(links(node, role)) > count)
+    cookie = headers["set-cookie"]
+    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    return cookie.split(";")[0]
+
+
+@pytest.mark.parametrize("path", ["/", "/api/state", "/api/sessions", "/ws", "/pair?token=0"])
+def test_a_name_that_is_not_the_pages_own_is_refused_on_every_path(node, path):
+    port = urlsplit(node.url).port
+    for host in ["evil.example", f"evil.example:{port}", f"127.0.0.1.evil.example:{port}", "127.0.0.1:1", ""]:
+        status, _, text = ask(node.url, path, Host=host)
+        assert status in (400, 403), (host, text)
+
+
+def test_the_page_says_that_nothing_comes_from_elsewhere_and_nobody_frames_it(node):
+    for path in ["/", "/api/state", "/nothing"]:
+        _, headers, _ = ask(node.url, path)
+        policy = headers["content-security-policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
+        assert headers["x-content-type-options"] == "nosniff" and headers["referrer-policy"] == "no-referrer"
+    status, headers, text = ask(node.url, "/")
+    assert (status, headers["content-type"]) == (200, "text/html; charset=utf-8")
+    # what it loads is here too
+    for asset in re.findall(rb'(?:src|href)="([^"]+)"', text):
+        assert asset.startswith(b"/"), asset
+        assert ask(node.url, asset.decode())[0] == 200, asset
+
+
+def test_a_request_of_another_page_is_refused(node):
+    for origin in ["http://evil.example", "null", node.url.replace("http:", "https:"), node.url + "0", ""]:
+        assert ask(node.url, "/api/state", Origin=origin)[0] == 403, origin
+        with pytest.raises(InvalidStatus) as refused, Socket(node.url, origin=origin or "null"):
+            pass
+        assert refused.value.response.status_code == 403
+    assert ask(node.url, "/api/state", Origin=node.url)[0] == 200
+    # who opens the socket without saying where it is from, and who changes something, is no browser's page of ours
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec_WebSocket_Version": "13"}
+    assert ask(node.url, "/ws", Sec_WebSocket_Key="x" * 22 + "==", **upgrade)[0] == 403
+    assert ask(node.url, "/api/state", method="POST")[0] == 403
+
+
+def test_without_a_link_nothing_is_shown_and_the_page_itself_is_no_secret(closed):
+    assert ask(closed.url, "/")[0] == 200
+    for path in ["/api/state", "/api/sessions", f"/api/sessions/{closed.session.name}/session.json"]:
+        for cookie in [None, "touchup=1", f"touchup_{urlsplit(closed.url).port}={'0' * 32}"]:
+            headers = {"Cookie": cookie} if cookie else {}
+            status, _, text = ask(closed.url, path, **headers)
+            assert status == 401 and "new link" in json.loads(text)["error"]
+    with pytest.raises(InvalidStatus) as refused, Socket(closed.url):
+        pass
+    assert refused.value.response.status_code == 401
+    for token in ["", "0" * 32, "../../etc/passwd"]:
+        assert ask(closed.url, f"/pair?token={token}")[0] == 403
+
+
+def test_a_link_is_good_once_and_gives_its_role(closed):
+    used = links(closed, "look")[-1]
+    looks, operates = let_in(closed, "look"), let_in(closed, "operate")
+    assert ask(closed.url, used)[0] == 403
+    with Socket(closed.url, cookie=looks) as one, Socket(closed.url, cookie=operates) as other:
+        for page, role in [(one, "look"), (other, "operate")]:
+            page.take_until(lambda page=page: page.newest.get("state", {}).get("clients") == 2 and page.faces)
+            assert page.newest["state"]["role"] == role
+        assert one.faces == other.faces
+        for name in ["~/undo", "~/reset", "~/pause", "~/stop", "~/save_mesh", "~/annotate_feature", "~/invite", "~/probe_all"]:
+            assert "may look and not operate" in one.call(name)["error"], name
+        assert "response" in one.call("~/arm_state")
+        assert other.call("~/pause", data=True)["response"]["success"]
+        one.take_until(lambda: one.newest["state"]["is_paused"])
+        assert other.call("~/pause", data=False)["response"]["success"]
+        link = other.call("~/invite", role="look")["response"]["link"]
+        assert ask(closed.url, urlsplit(link).path + "?" + urlsplit(link).query)[0] == 303
+
+
+def test_files_of_sessions_and_no_others_can_be_downloaded(node):
+    status, _, text = ask(node.url, "/api/sessions")
+    (listed,) = json.loads(text)
+    assert status == 200 and listed["is_current"] and listed["name"] == node.session.name
+    assert "session.json" in listed["files"]
+    status, headers, text = ask(node.url, f"/api/sessions/{node.session.name}/session.json")
+    assert (status, text) == (200, (node.session / "session.json").read_bytes())
+    assert headers["content-disposition"] == 'attachment; filename="session.json"'
+    (node.session / "link.json").symlink_to("/etc/hostname")
+    (node.session.parent / "linked").symlink_to("/etc")
+    name = node.session.name
+    for place in [
+        f"{name}/link.json", "linked/hostname", f"{name}/recording", f"{name}/missing", f"{name}/.", f"{name}/..%2Fx",
+        "..%2F..%2Fetc/passwd", "%2Fetc/passwd", f"{name}/%2Fetc%2Fpasswd", ".hidden/x", f"{name}/a%00b", f"{name}/a%0Ab",
+    ]:
+        status, _, text = ask(node.url, f"/api/sessions/{place}")
+        assert status in (400, 404), (place, text)
+    assert ask(node.url, f"/api/sessions/../../etc/passwd")[0] == 404
+
+
+def test_a_page_that_sends_too_much_is_cut_off_and_others_are_not(node):
+    with Socket(node.url) as other:
+        with Socket(node.url) as large:
+            large.socket.send("x" * 100_000)
+            with pytest.raises(ConnectionClosed):
+                large.take_until(lambda: False)
+        with Socket(node.url) as many:
+            with pytest.raises(ConnectionClosed):
+                for _ in range(1000):
+                    many.beat()
+                many.take_until(lambda: False)
+        for nonsense in ["", "{}", "[]", "null", '{"call": 1}', '{"id": "x", "call": "~/undo", "request": {"strokes": "all"}}', "\0"]:
+            other.socket.send(nonsense)
+        assert other.call("~/undo", strokes=1)["response"]["message"] == "there is no stroke to be taken back"
+        assert "there is no field" in other.call("~/undo", stroke=1)["error"]
+        assert "no service" in other.call("~/nothing")["error"]
+
+
+def test_pages_beyond_sixteen_are_turned_away(node):
+    pages = [Socket(node.url) for _ in range(16)]
+    with pytest.raises(InvalidStatus) as refused, Socket(node.url):
+        pass
+    assert refused.value.response.status_code == 503
+    for page in pages:
+        page.__exit__()
+    until = time.monotonic() + 30
+    while True:
+        try:
+            with Socket(node.url) as page:
+                page.take_until(lambda: page.faces)
+            return
+        except InvalidStatus:
+            assert time.monotonic() < until, "their places are free again"
+            time.sleep(0.1)
+
+
+def test_a_certificate_of_the_user_encrypts_the_page(touchup_bin, demo_folder, tmp_path):
+    chain, key = tmp_path / "chain.pem", tmp_path / "key.pem"
+    subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]
+    made = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-keyout", key, "-out", chain, *subject]
+    subprocess.run(made, check=True, capture_output=True)
+    files = ["--web-links", "--web-certificate", chain, "--web-key", key]
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", *files) as node:
+        assert node.url.startswith("https://")
+        trusted = ssl.create_default_context(cafile=chain)
+        status, headers, _ = ask(node.url, links(node, "look")[-1], context=trusted)
+        assert status == 303 and "; Secure" in headers["set-cookie"]
+        cookie = headers["set-cookie"].split(";")[0]
+        with Socket(node.url, cookie=cookie, ssl=trusted) as page:
+            page.take_until(lambda: page.faces)
+        with pytest.raises(ssl.SSLError):
+            ask(node.url, "/", context=ssl.create_default_context())
+        # one that says nothing holds nobody up
+        place = urlsplit(node.url)
+        with socket.create_connection((place.hostname, place.port)):
+            assert ask(node.url, "/", context=trusted)[0] == 200
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--web", "nowhere"], 2, "address and a port"),
+        (["--web-name", "cell.local"], 2, "--web"),
+        (["--web", "127.0.0.1:0", "--web-certificate", "missing.pem", "--web-key", "missing.pem"], 3, "missing.pem"),
+        (["--web", "192.0.2.1:8321"], 1, "192.0.2.1:8321"),
+    ],
+)
+def test_what_is_wrong_with_the_flags_is_said(touchup, demo_folder, tmp_path, arguments, code, words):
+    ros = ["-p", f"scan:={demo_folder / 'scan.ply'}", "-p", f"session_folder:={tmp_path / 'sessions'}"]
+    done = touchup("node", "--tip-radius-mm", 1.5, *arguments, "--ros-args", *ros)
+    assert done.returncode == code and words in done.stderr, done.stderr
+
+
+def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_nothing_holds_nobody_up(
+    touchup_bin, demo_folder, tmp_path
+):
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply") as node, Socket(node.url) as early:
+        early.take_until(lambda: early.faces)
+        # it asks for the socket and reads nothing more
+        place = urlsplit(node.url)
+        slow = socket.create_connection((place.hostname, place.port))
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        lines = [
+            "GET /ws HTTP/1.1", f"Host: {place.netloc}", f"Origin: {node.url}", "Connection: Upgrade", "Upgrade: websocket",
+            "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==", f"Sec-WebSocket-Protocol: {PROTOCOL}",
+        ]
+        slow.sendall("\r\n".join([*lines, "", ""]).encode())
+        before = early.version
+        played = play(touchup_bin, demo_folder / "touch.mcap", "--speed", 8, domain=node.domain)
+        assert played["unsent"] == 0
+        # at rest, some time after the last sample, it is what is saved
+        early.take_until(lambda: early.call("~/save_mesh", overwrite=True, name="saved.ply")["response"]["mesh_version"])
+        saved = early.call("~/save_mesh", overwrite=True, name="saved.ply")["response"]
+        early.take_until(lambda: early.version >= saved["mesh_version"])
+        assert early.version > before
+        with Socket(node.url) as late:
+            late.take_until(lambda: late.version >= saved["mesh_version"])
+            assert (late.faces, late.vertices) == (early.faces, early.vertices)
+        assert early.newest["features"]["features"] and early.newest["tip"]["markers"]
+        mesh = trimesh.load(node.session / "saved.ply", process=False)
+        assert len(early.faces) == len(mesh.faces) == saved["face_count"]
+        corners = numpy.array([[early.vertices[vertex] for vertex in face] for face in early.faces.values()])
+        # the same triangles, however they are numbered: each has its own middle, and that is one of the others
+        ours, theirs = (numpy.asarray(triangles).mean(axis=1) for triangles in (corners * 1e3, mesh.triangles))
+        distances, nearest = cKDTree(theirs).query(ours)
+        assert distances.max() < 1e-3 and len(set(nearest)) == len(theirs)
+        slow.close()
+        assert node.end() in (0, 4), node.text()
+

@@ -1,0 +1,145 @@
+"""An arm moves for the page only while its button is held: the beats of a socket, and the button in a browser. The arm is simulated."""
+
+import re
+import threading
+import time
+
+import numpy
+import pytest
+from browser import opened
+from conftest import ROOT, write_result
+from web_page import PageNode, Socket
+
+# of Feature and ProbeResult
+HOLE, PLANNED, ARM_NOT_READY, STOPPED_IN_PLACE = 1, 4, 25, 50
+# of the plate of the demo, m: the through hole in its top
+THROUGH = {"x": 0.016, "y": 0.036, "z": 0.012}
+# within this time after the last beat the arm stands
+STANDS_WITHIN_S = 0.2
+# tip markers come so often
+FRAME_S = 0.05
+# between two markers a tip at rest seems to move by less than this, and one that searches by more: the noise of the simulated arm
+NOISE_M = 100e-6
+
+
+@pytest.fixture
+def node(touchup_bin, demo_folder, tmp_path):
+    """A node with a simulated arm that may move."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text((ROOT / "config/probe.yaml").read_text().replace("scan.ply", str(demo_folder / "scan.ply")))
+    words = ["robot:=sim", "source:=probe", "allow_motion:=true", f"sim_part:={demo_folder / 'truth.ply'}"]
+    ros = [word for parameter in words for word in ("-p", parameter)]
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", "--scene", scene, ros=ros) as node:
+        yield node
+
+
+class Beats:
+    """The beats of a held button, from a thread of their own."""
+
+    def __init__(self, page):
+        self.page, self.is_held, self.last = page, True, 0.0
+        self.thread = threading.Thread(target=self.run)
+        self.thread.start()
+
+    def run(self):
+        while self.is_held:
+            self.page.beat()
+            self.last = time.monotonic()
+            time.sleep(0.05)
+
+    def let_go(self):
+        self.is_held = False
+        self.thread.join()
+        return self.last
+
+
+def flagged(page):
+    """The number of the hole, once the arm is ready."""
+    page.take_until(lambda: page.call("~/arm_state")["response"]["success"])
+    answer = page.call("~/flag_feature", kind=HOLE, point={"header": {"frame_id": "object"}, "point": THROUGH})
+    return answer["response"]["id"]
+
+
+def arm_of(node, condition):
+    """Waits until the arm is so."""
+    with Socket(node.url) as watching:
+        watching.take_until(lambda: condition(watching.newest.get("state", {"arm": {"motion": "", "stays_because": ""}})["arm"]))
+
+
+def order(page, hole, beats_s=0.0):
+    """Orders a probing by held beats, and lets go after some time; when that was, and the result of the order."""
+    beats = Beats(page)
+    time.sleep(0.1)
+    page.socket.send('{"id": "order", "call": "~/probe_feature", "request": {"id": %d}}' % hole)
+    time.sleep(beats_s)
+    let_go = beats.let_go()
+    page.take_until(lambda: "order" in page.answers)
+    return let_go, page.answers.pop("order")["response"]["result"]
+
+
+def test_an_order_is_taken_while_the_button_is_held_and_the_arm_stays_when_it_is_let_go_until_it_is_recovered(node):
+    with Socket(node.url) as page:
+        hole = flagged(page)
+        planned = page.call("~/probe_feature", id=hole, settings={"dry_run": True})
+        assert planned["response"]["result"]["code"] == PLANNED
+        page.take_until(lambda: page.newest.get("path", {}).get("poses"))
+        assert "while the button is held" in page.call("~/probe_feature", id=hole)["error"]
+        assert "while the button is held" in page.call("~/probe_all")["error"]
+        _, result = order(page, hole)
+        assert result["code"] == STOPPED_IN_PLACE and "let go" in result["message"], result
+        page.take_until(lambda: page.newest["state"]["arm"]["stays_because"])
+        # nothing moves by beats alone
+        _, refused = order(page, hole)
+        assert refused["code"] == ARM_NOT_READY and "~/recover" in refused["message"], refused
+        assert page.call("~/recover")["response"]["success"]
+        page.take_until(lambda: not page.newest["state"]["arm"]["stays_because"])
+
+
+@pytest.mark.full
+def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_while_the_button_is_held(node):
+    with Socket(node.url) as page, Socket(node.url) as watching:
+        hole = flagged(page)
+        places, until = [], [float("inf")]
+
+        def watch():
+            while time.monotonic() < until[0]:
+                watching.take()
+                for marker in watching.newest.get("tip", {}).get("markers", [])[:1]:
+                    place = marker["pose"]["position"]
+                    places.append((time.monotonic(), numpy.array([place["x"], place["y"], place["z"]])))
+
+        watcher = threading.Thread(target=watch)
+        watcher.start()
+        # on its way through free air, from where it can go on
+        let_go, result = order(page, hole, beats_s=1.0)
+        until[0] = time.monotonic() + 2
+        watcher.join()
+        assert result["code"] == STOPPED_IN_PLACE
+        moved = [at for (at, place), (_, before) in zip(places[1:], places) if numpy.linalg.norm(place - before) > NOISE_M]
+        stands = max(moved) - let_go
+        write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, seen by markers 33 ms apart.\n")
+        assert -0.2 < stands < STANDS_WITHIN_S + FRAME_S, stands
+        assert page.call("~/recover")["response"]["success"]
+        _, done = order(page, hole, beats_s=120)
+        assert done["code"] in (1, 2) and abs(done["feature"]["diameter"] - 8e-3) < 50e-6, done
+
+
+def test_a_button_in_the_page_moves_the_arm_while_it_is_held(browser, node):
+    with Socket(node.url) as flagging:
+        hole = flagged(flagging)
+    page = opened(browser, node.url)
+    page.locator("button.feature", has=page.locator(".number", has_text=re.compile(f"^{hole}$"))).click()
+    page.get_by_role("button", name="Show the plan").click()
+    page.get_by_role("button", name="Approve the plan").click(timeout=120_000)
+    button = page.get_by_role("button", name="Hold to run")
+    button.scroll_into_view_if_needed()
+    button.hover()
+    page.mouse.down()
+    arm_of(node, lambda arm: arm["motion"] != "rests" or arm["stays_because"])
+    page.mouse.up()
+    arm_of(node, lambda arm: "let go" in (arm["stays_because"] or ""))
+    assert page.get_by_text("not an emergency stop").first.is_visible()
+    page.get_by_role("button", name="recover").click()
+    arm_of(node, lambda arm: not arm["stays_because"])
+    assert page.wrong == []
+    page.context.close()
