@@ -73,13 +73,15 @@ export function coneWords(feature: NotedFeature): string | null {
 /** Why a feature needs touches. */
 export type Need =
   | { kind: "untouched" }
+  | { kind: "little"; share: number }
   | { kind: "unknown"; touches: number }
   | { kind: "wide"; size: TextKey; u: number };
 
 /** What is wanted most of a feature; null when all of its numbers are known within the tolerance (m, of U). */
 export function need(feature: NotedFeature, tolerance: number): Need | null {
   if (feature.status === Status.flagged || feature.fitted_to !== FittedTo.touches) {
-    return feature.touch_count > 0 ? { kind: "unknown", touches: feature.touch_count } : { kind: "untouched" };
+    // too little of it was touched for numbers from touches
+    return (feature.touched ?? 0) > 0 ? { kind: "little", share: feature.touched ?? 0 } : { kind: "untouched" };
   }
   const asked = sizes(feature).filter((size) => !size.isAtLeast);
   const [widest] = asked.sort((a, b) => (b.u ?? Infinity) - (a.u ?? Infinity));

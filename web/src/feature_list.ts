@@ -76,7 +76,7 @@ export class FeatureList {
     const lock = picture("lock");
     // the number of the feature stands on it, the lock below
     const badge = el("span", { class: "badge" }, number, lock);
-    element.append(badge, name, state, size);
+    element.append(badge, el("span", { class: "top" }, name, state), size);
     this.list.append(el("li", {}, element));
     const row = { element, number, name, size, state, lock };
     this.rows.set(id, row);
@@ -102,8 +102,12 @@ export function judgement(feature: NotedFeature): [words: string, level: "good" 
   if (feature.mark === "accepted") return [`✓ ${t("accepted")}${lock}`, "good"];
   if (feature.mark === "rejected") return [`✕ ${t("rejected")}${lock}`, "plain"];
   if (feature.status === Status.flagged) return [`◌ ${t("toMeasure")}`, "open"];
-  if (feature.fitted_to !== FittedTo.touches) return [`◌ ${t("fromScan")}${lock}`, isAsked(feature) ? "open" : "plain"];
-  const touched = t("touchedShare", { touches: feature.touch_count, share: percent(feature.touched ?? 0) });
+  const share = percent(feature.touched ?? 0);
+  if (feature.fitted_to !== FittedTo.touches) {
+    const words = (feature.touched ?? 0) > 0 ? t("tooLittle", { share }) : t("fromScan");
+    return [`◌ ${words}${lock}`, isAsked(feature) ? "open" : "plain"];
+  }
+  const touched = t("touchedShare", { touches: feature.touch_count, share });
   const isReached = need(feature, settings.tolerance) === null;
   return [`${isReached ? "✓" : "◔"} ${touched}${lock}`, isReached ? "good" : "open"];
 }

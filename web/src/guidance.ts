@@ -9,7 +9,7 @@ import { isAsked, nearestTo, need, title, urgency } from "./feature_facts";
 import { onLanguage, t } from "./language";
 import type { NotedFeature } from "./messages";
 import type { Model } from "./model";
-import { decimal, typedMillimetres, uncertainty } from "./numbers";
+import { decimal, percent, typedMillimetres, uncertainty } from "./numbers";
 import { keep, settings } from "./settings";
 
 export class Guidance {
@@ -84,6 +84,7 @@ export class Guidance {
     const wanted = need(feature, settings.tolerance);
     if (wanted === null) return "";
     if (wanted.kind === "untouched") return t("needUntouched");
+    if (wanted.kind === "little") return t("needLittle", { share: percent(wanted.share) });
     if (wanted.kind === "unknown") return t("needUnknown", { touches: wanted.touches });
     return t("needWide", {
       size: t(wanted.size),

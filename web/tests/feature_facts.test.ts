@@ -43,7 +43,8 @@ describe("what it wants", () => {
   });
 
   it("is a first touch where nothing was touched, and a number of touches where U is not known", () => {
-    expect(need({ ...hole, fitted_to: FittedTo.mesh, touch_count: 0 }, 1)).toEqual({ kind: "untouched" });
+    expect(need({ ...hole, fitted_to: FittedTo.mesh, touched: 0 }, 1)).toEqual({ kind: "untouched" });
+    expect(need({ ...hole, fitted_to: FittedTo.mesh, touched: 0.1 }, 1)).toEqual({ kind: "little", share: 0.1 });
     expect(need({ ...hole, diameter_std: null }, 1)).toEqual({ kind: "unknown", touches: 8 });
     expect(urgency({ ...hole, status: Status.flagged, touch_count: 0 }, 1)).toBe(Infinity);
   });
