@@ -37,7 +37,6 @@ export class Controls {
     const words = this.pause.querySelector("span");
     if (words !== null) say(words, this.isPaused ? "goOn" : "pause");
     this.pause.querySelector("svg")?.replaceWith(picture(this.isPaused ? "play" : "pause"));
-    this.pause.setAttribute("aria-pressed", String(this.isPaused));
   }
 
   private async save(): Promise<void> {

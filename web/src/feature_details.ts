@@ -91,7 +91,6 @@ export class FeatureDetails {
     this.judged.dataset.level = level;
     this.marks.accepted.setAttribute("aria-pressed", String(feature.mark === "accepted"));
     this.marks.rejected.setAttribute("aria-pressed", String(feature.mark === "rejected"));
-    this.marks.locked.setAttribute("aria-pressed", String(feature.is_locked));
     const lock = this.marks.locked.querySelector("span");
     if (lock !== null) say(lock, feature.is_locked ? "unlock" : "lock");
     this.numbers.replaceChildren(...this.facts(feature).flatMap(([term, words]) => [el("dt", {}, term), el("dd", {}, words)]));

@@ -2,7 +2,7 @@
  * All features as a list: number, kind, size with U, and whether that is good enough. A row stays the same element while its numbers
  * change, so that focus and place in the list stay too.
  */
-import { button, el, write } from "./dom";
+import { button, el, picture, write } from "./dom";
 import { isAsked, isMinor, kindText, mainWords, need } from "./feature_facts";
 import { onLanguage, t } from "./language";
 import { type NotedFeature, FittedTo, Status } from "./messages";
@@ -17,6 +17,7 @@ interface Row {
   name: HTMLElement;
   size: HTMLElement;
   state: HTMLElement;
+  lock: SVGElement;
 }
 
 export class FeatureList {
@@ -72,9 +73,12 @@ export class FeatureList {
   private add(id: number): Row {
     const [number, name, size, state] = ["number", "name", "size", "state"].map((part) => el("span", { class: part }));
     const element = el("button", { class: "feature", attributes: { type: "button" }, onClick: () => this.onSelect(id) });
-    element.append(number, name, state, size);
+    const lock = picture("lock");
+    // the number of the feature stands on it, the lock below
+    const badge = el("span", { class: "badge" }, number, lock);
+    element.append(badge, name, state, size);
     this.list.append(el("li", {}, element));
-    const row = { element, number, name, size, state };
+    const row = { element, number, name, size, state, lock };
     this.rows.set(id, row);
     return row;
   }
@@ -86,6 +90,7 @@ export class FeatureList {
     const [words, level] = judgement(feature);
     write(row.state, words);
     row.state.dataset.level = level;
+    row.lock.classList.toggle("none", !feature.is_locked);
     row.element.classList.toggle("flagged", feature.status === Status.flagged);
     row.element.setAttribute("aria-current", String(feature.id === this.model.selected));
   }

@@ -46,6 +46,7 @@ export class Labels {
       write(label.element, String(feature.id));
       label.element.setAttribute("aria-label", title(feature));
       label.element.classList.toggle("flagged", feature.status === Status.flagged);
+      label.element.classList.toggle("locked", feature.is_locked);
       label.element.classList.toggle("rejected", feature.mark === "rejected");
       label.element.setAttribute("aria-pressed", String(feature.id === selected));
     }

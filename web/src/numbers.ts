@@ -16,9 +16,18 @@ const PLAIN_DECIMALS = 2;
 /** What binary fractions may put onto a decimal, relative. */
 const ROUNDING = 1e-9;
 
+/** By language and decimals: making one takes longer than a hundred numbers. */
+const formats = new Map<string, Intl.NumberFormat>();
+
 export function decimal(number: number, decimals: number): string {
-  const options = { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false };
-  return new Intl.NumberFormat(locale(), options).format(number).replace("-", "−");
+  const key = `${locale()} ${decimals}`;
+  let format = formats.get(key);
+  if (format === undefined) {
+    const options = { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false };
+    format = new Intl.NumberFormat(locale(), options);
+    formats.set(key, format);
+  }
+  return format.format(number).replace("-", "−");
 }
 
 /** Decimals with which a number greater than 0 shows two digits that count. */

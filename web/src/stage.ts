@@ -67,7 +67,7 @@ export class Stage {
     const gl = this.renderer.getContext();
     const ratio = this.renderer.getPixelRatio();
     const bytes = new Uint8Array(4);
-    gl.readPixels(Math.floor(x * ratio), Math.floor((this.size.height - y) * ratio), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    gl.readPixels(Math.floor(x * ratio), Math.ceil((this.size.height - y) * ratio) - 1, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
     return [...bytes];
   }
 
