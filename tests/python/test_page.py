@@ -12,7 +12,7 @@ from browser import DESKTOP, LANDSCAPE, PORTRAIT, first_hits, opened, picture, r
 from conftest import ROOT
 from ros_process import Process, play
 from test_web import links
-from web_page import PageNode
+from web_page import PageNode, Socket
 
 # the part is 0.07 m from 700 px wide
 HALF_A_PIXEL_M = 5e-5
@@ -52,6 +52,11 @@ def call(page, service, /, **request):
     )
 
 
+def cookie_of(page):
+    (cookie,) = page.context.cookies()
+    return f"{cookie['name']}={cookie['value']}"
+
+
 def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
     page = page_of(browser, touched)
     # at rest the mesh of every follower is what is saved
@@ -63,7 +68,6 @@ def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
     page.evaluate("document.querySelectorAll('.picture > :not(canvas)').forEach((each) => (each.style.display = 'none'))")
     shot, box = picture(page)
     mesh = trimesh.load(touched.session / "seen.ply", process=False)
-    support = numpy.asarray(mesh.metadata["_ply_raw"]["vertex"]["data"]["support"]).ravel()
     assert page.evaluate("touchup.faceCount()") == len(mesh.faces)
 
     random = numpy.random.default_rng(7)
@@ -76,8 +80,12 @@ def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
     assert (hits >= 0).sum() > 200 and (hits < 0).sum() > 200
     assert (is_seen == (hits >= 0)).mean() > 0.985
 
-    # one colour for each kind of support: faces all of whose corners are of one kind
-    corners = support[mesh.faces[hits]]
+    # one colour for each kind of support, as another follower has it: faces all of whose corners are of one kind
+    with Socket(touched.url, cookie=cookie_of(page)) as follower:
+        follower.take_until(lambda: follower.version >= saved["mesh_version"])
+        places = numpy.array([[follower.vertices[vertex] for vertex in face] for face in follower.faces.values()])
+        support = numpy.array([[follower.support[vertex] for vertex in face] for face in follower.faces.values()])
+    corners = support[first_hits(*rays(page, points, box), places)]
     is_one = (hits >= 0) & (corners.min(1) == corners.max(1))
     red, green, blue = seen.T
     shown = numpy.select([green > 1.3 * numpy.maximum(red, blue), blue > 1.25 * red, red > 1.3 * blue], [1, 2, 3], 0)

@@ -139,7 +139,7 @@ def test_a_button_in_the_page_moves_the_arm_while_it_is_held(browser, node):
     page.mouse.up()
     arm_of(node, lambda arm: "let go" in (arm["stays_because"] or ""))
     assert page.get_by_text("not an emergency stop").first.is_visible()
-    page.get_by_role("button", name="recover").click()
+    page.get_by_role("button", name="let it move again").click()
     arm_of(node, lambda arm: not arm["stays_because"])
     assert page.wrong == []
     page.context.close()
