@@ -87,7 +87,9 @@ fn demo_on_page(web: &WebFlags, out: &std::path::Path, tip_radius: f64) -> Resul
     let mut parameters = parameters_of(&out.join("scan.ply"), MeshUnit::Millimetre, &out.join("sessions"))?;
     parameters.set("tip_radius_mm", &ParameterValue::Double(tip_radius * 1e3)).map_err(CliError::usage)?;
     let recording = Recording::open(&out.join("touch.mcap"), &Topics::default(), StampSource::Header)?;
-    let NodeEnd { folder, report } = on_page(web, parameters, recording, None)?;
+    // the plate as it is: there the page can show how far off the scan was
+    let web = web.with_nominal(out.join("truth.ply"));
+    let NodeEnd { folder, report } = on_page(&web, parameters, recording, None)?;
     print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
     Ok(Losses::new())
 }

@@ -16,6 +16,8 @@ use crate::ros::node::Prepared;
 use crate::ros::port::Port;
 #[cfg(feature = "web")]
 use crate::ros::web::{Certificate, NodeFacts, WebParams, WebServer, start};
+#[cfg(feature = "web")]
+use crate::scan::read_scan;
 
 /// There is none.
 #[cfg(not(feature = "web"))]
@@ -37,6 +39,9 @@ pub(super) struct WebFlags {
     /// Lets in by link alone also on this machine, where else every user is
     #[arg(long, requires = "web")]
     web_links: bool,
+    /// The part as it should be, in the frame and the unit of the scan: the page colours by the deviation from it
+    #[arg(long, value_name = "MESH", requires = "web")]
+    web_nominal: Option<PathBuf>,
     /// Serves the page by TLS with this certificate chain, PEM
     #[arg(long, value_name = "PEM", requires_all = ["web", "web_key"])]
     web_certificate: Option<PathBuf>,
@@ -54,6 +59,11 @@ impl WebFlags {
     /// Whether a page is wanted.
     pub fn is_wanted(&self) -> bool {
         self.web.is_some()
+    }
+
+    /// The same with a nominal part, unless one was named.
+    pub fn with_nominal(&self, mesh: PathBuf) -> Self {
+        Self { web_nominal: self.web_nominal.clone().or(Some(mesh)), ..self.clone() }
     }
 
     /// The port for the node: no page is wanted, or this program has none.
@@ -82,7 +92,9 @@ impl WebFlags {
         let is_open = certificate.is_none() && !address.ip().is_loopback();
         let (scan, faces) = ready.scan();
         let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
-        let facts = NodeFacts { scan: scan.to_owned(), faces, session_folder };
+        let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, ready.mesh_unit()));
+        let nominal = nominal.transpose().map_err(CliError::truth)?.map(|scan| scan.mesh);
+        let facts = NodeFacts { scan: scan.to_owned(), faces, session_folder, nominal };
         let by_link = self.web_links || !address.ip().is_loopback();
         let params = WebParams { address, names: self.web_name.clone(), by_link, certificate };
         let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;

@@ -4,7 +4,7 @@
  * Categories are from the palette of Okabe and Ito; the scales grow in lightness, or from a light middle to two dark ends, so that
  * they read without telling red from green.
  */
-import type { MeshStore } from "./mesh_store";
+import { FAR, type MeshStore } from "./mesh_store";
 import type { TextKey } from "./texts";
 
 export type Rgb = readonly [number, number, number];
@@ -93,7 +93,7 @@ export function scaleEnd(mode: ColourMode, store: MeshStore): number {
     for (let i = 0; i < store.variance.length; i++) if (store.variance[i] > largest) largest = store.variance[i];
     largest = Math.sqrt(largest);
   } else if (mode.name === "deviation" && store.deviation !== null) {
-    for (const x of store.deviation) if (Math.abs(x) > largest) largest = Math.abs(x);
+    for (const x of store.deviation) if (Math.abs(x) > largest && x < FAR) largest = Math.abs(x);
   }
   return roundedUp(largest);
 }

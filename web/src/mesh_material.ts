@@ -3,6 +3,7 @@
  * kept while the mesh moves; the colour of a vertex is chosen in the shader, so that another choice uploads nothing.
  */
 import { GLSL3, ShaderMaterial, DoubleSide, Vector3 } from "three";
+import { FAR } from "./mesh_store";
 import { type ColourMode, SCALE_STEPS, UNKNOWN_COLOUR, rgb } from "./colours";
 
 /** Categories at most. */
@@ -24,7 +25,7 @@ const VERTEX = /* glsl */ `
     vPlace = place.xyz;
     vColour = categories[int(mode == 3 ? quality.y : quality.x) & 3];
     vScale = mode == 2 ? 0.5 + 0.5 * deviation / scaleEnd : sqrt(max(variance, 0.0)) / scaleEnd;
-    vUnknown = mode == 1 && variance < 0.0 ? 1.0 : 0.0;
+    vUnknown = mode == 1 && variance < 0.0 || mode == 2 && deviation >= ${FAR.toFixed(1)} ? 1.0 : 0.0;
     gl_Position = projectionMatrix * place;
   }
 `;

@@ -14,6 +14,9 @@ export class GapError extends Error {}
 /** Bytes of `quality` for each vertex. */
 export const QUALITY = { support: 0, outlier: 1, alive: 3 } as const;
 
+/** Deviation, m, of a vertex that the nominal part is far from: no part is so large. */
+export const FAR = 1e3;
+
 /** Room beyond what was asked for, so that not every new vertex makes the arrays grow. */
 const SPARE = 1.25;
 
@@ -96,6 +99,17 @@ export class MeshStore {
     if (session !== this.session) this.clear();
     this.session = session;
     this.whole = { vertices: new Uint8Array(this.positions.length / 3), faces: new Uint8Array(this.corners.length / 3) };
+  }
+
+  /** Takes up deviations from the nominal part, m, of vertices that are here. */
+  setDeviations(vertices: Uint32Array, deviations: Float32Array): void {
+    this.deviation ??= new Float32Array(this.positions.length / 3).fill(FAR);
+    for (let i = 0; i < vertices.length; i++) {
+      const vertex = vertices[i];
+      if (vertex >= this.deviation.length) continue;
+      this.deviation[vertex] = Number.isNaN(deviations[i]) ? FAR : deviations[i];
+      this.dirtyVertices.mark(vertex);
+    }
   }
 
   private clear(): void {
@@ -186,7 +200,7 @@ export class MeshStore {
     this.variance = grown(this.variance, new Float32Array(vertexRoom));
     this.quality = grown(this.quality, new Uint8Array(4 * vertexRoom));
     this.corners = grown(this.corners, new Uint32Array(3 * faceRoom));
-    if (this.deviation !== null) this.deviation = grown(this.deviation, new Float32Array(vertexRoom));
+    if (this.deviation !== null) this.deviation = grown(this.deviation, new Float32Array(vertexRoom).fill(FAR));
     if (this.whole !== null) {
       this.whole.vertices = grown(this.whole.vertices, new Uint8Array(vertexRoom));
       this.whole.faces = grown(this.whole.faces, new Uint8Array(faceRoom));

@@ -16,6 +16,7 @@ use super::setup::Setup;
 use super::side_work::begin;
 use super::view::View;
 use crate::clock::Clock;
+use crate::io::mesh_file::MeshUnit;
 use crate::ros::inbox::Arrivals;
 use crate::ros::messages::MeshPatch;
 use crate::ros::parameters::{ParameterValue, Parameters};
@@ -75,6 +76,11 @@ impl Prepared {
     /// The scan: where it was read from, and how many faces it has.
     pub fn scan(&self) -> (&Path, usize) {
         (&self.setup.scan_path, self.setup.scan.0.face_count())
+    }
+
+    /// Unit of the coordinates in files of meshes.
+    pub fn mesh_unit(&self) -> MeshUnit {
+        self.setup.mesh_unit
     }
 
     /// The mesh before anything was touched, in parts: what a follower has that is there from the beginning.

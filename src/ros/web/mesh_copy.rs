@@ -162,7 +162,8 @@ impl MeshCopy {
     ///
     /// In parts, a state may change between them: a face may name a vertex that comes with the next.
     pub fn next_for(&mut self, page: PageId) -> Option<MeshPatch> {
-        if self.is_coming {
+        // there is none yet
+        if self.is_coming || self.version == 0 {
             return None;
         }
         let Self { pages, positions, variance, support, corners, .. } = self;

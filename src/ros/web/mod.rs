@@ -13,6 +13,7 @@ mod downloads;
 mod http;
 mod listener;
 mod mesh_copy;
+mod nominal;
 mod page;
 
 use std::io;
@@ -35,11 +36,13 @@ use self::annotations::{AnnotateRequest, Annotations};
 use self::board::Board;
 use self::calls::{Answer, Calls, MAY_ONLY_LOOK};
 pub use self::listener::Certificate;
+use self::nominal::Nominal;
 use super::exchange::RosError;
 use super::inbox::Inbox;
 use super::messages::MeshPatch;
 use super::port::{Port, Publication};
 use super::stop::Motion;
+use crate::mesh::TriMesh;
 
 /// Why the page is not served.
 #[derive(Debug, thiserror::Error)]
@@ -90,6 +93,8 @@ pub struct NodeFacts {
     pub faces: usize,
     /// where sessions lie, each in a folder of its own
     pub session_folder: PathBuf,
+    /// the part as it should be, m in O; `None`: nobody said
+    pub nominal: Option<TriMesh>,
 }
 
 /// What all pages share.
@@ -99,6 +104,7 @@ struct Site {
     inbox: Inbox,
     access: Access,
     annotations: Annotations,
+    nominal: Option<Arc<Nominal>>,
     scan: ScanShown,
     session_folder: PathBuf,
     /// pages that are open
@@ -282,6 +288,7 @@ pub fn start(
         inbox,
         access,
         annotations: Annotations::new(&facts.session_folder),
+        nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
         scan: ScanShown { file, faces: facts.faces },
         session_folder: facts.session_folder,
         pages: AtomicUsize::new(0),

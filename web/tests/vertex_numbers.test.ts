@@ -1,0 +1,40 @@
+import { describe, expect, it } from "vitest";
+import { CdrError } from "../src/cdr";
+import { FAR, MeshStore } from "../src/mesh_store";
+import { decodeDeviations, isVertexNumbers } from "../src/vertex_numbers";
+
+/** Written byte by byte, as the frame is described. */
+function frame(vertices: number[], numbers: number[], kind = 2, which = 1): ArrayBuffer {
+  const bytes = new ArrayBuffer(8 + 8 * vertices.length);
+  const view = new DataView(bytes);
+  view.setUint8(0, kind);
+  view.setUint8(1, which);
+  view.setUint32(4, vertices.length, true);
+  vertices.forEach((vertex, i) => view.setUint32(8 + 4 * i, vertex, true));
+  numbers.forEach((number, i) => view.setFloat32(8 + 4 * vertices.length + 4 * i, number, true));
+  return bytes;
+}
+
+describe("deviations of vertices", () => {
+  it("come with the numbers of their vertices", () => {
+    const bytes = frame([3, 900], [0.5, -0.25]);
+    expect(isVertexNumbers(bytes)).toBe(true);
+    const [vertices, deviations] = decodeDeviations(bytes);
+    expect([...vertices]).toEqual([3, 900]);
+    expect([...deviations]).toEqual([0.5, -0.25]);
+  });
+
+  it("are refused where the frame is cut off, longer, or of another number", () => {
+    expect(isVertexNumbers(frame([1], [1], 1))).toBe(false);
+    expect(() => decodeDeviations(frame([1], [1]).slice(0, 12))).toThrow(CdrError);
+    expect(() => decodeDeviations(new ArrayBuffer(4))).toThrow(CdrError);
+    expect(() => decodeDeviations(frame([1], [1], 2, 9))).toThrow(CdrError);
+  });
+
+  it("are kept for vertices that are there, and far where nobody measured them", () => {
+    const store = new MeshStore();
+    store.positions = new Float32Array(9);
+    store.setDeviations(...decodeDeviations(frame([0, 1, 77], [0.001, Number.NaN, 1])));
+    expect([...(store.deviation ?? [])]).toEqual([Math.fround(0.001), FAR, FAR]);
+  });
+});
