@@ -288,7 +288,9 @@ impl RefineArguments {
         let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
         // files that the scene names are relative to its folder
         let beside = self.scene.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
-        let mut text = tempfile::Builder::new().suffix(".yaml").tempfile_in(beside.unwrap_or(Path::new(".")))?;
+        let mut files = tempfile::Builder::new();
+        files.suffix(".yaml");
+        let mut text = beside.map_or_else(|| files.tempfile(), |folder| files.tempfile_in(folder))?;
         std::io::Write::write_all(&mut text, self.told.scene_text(self.scene.as_deref())?.as_bytes())?;
         parameters.set("scene", &path(text.path())?).map_err(CliError::usage)?;
         let NodeEnd { folder, .. } = on_page(&self.web, parameters, recording, markers)?;

@@ -12,9 +12,11 @@ from urllib.parse import urlsplit
 import numpy
 import pytest
 import trimesh
-from ros_process import play
+from conftest import ROOT
+from ros_domains import domains
+from ros_process import Process, play
 from scipy.spatial import cKDTree
-from web_page import PROTOCOL, PageNode, Socket
+from web_page import PROTOCOL, PageNode, Socket, page_url
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 
@@ -264,3 +266,24 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         slow.close()
         assert node.end() in (0, 4), node.text()
 
+
+
+def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_then(touchup_bin, touchup, demo_folder, tmp_path):
+    files = ["--scan", demo_folder / "scan.ply", "--bag", demo_folder / "touch.mcap", "--out", tmp_path / "refined.ply"]
+    told = ["--tip-radius-mm", 1.5, "--stiffness-n-per-mm", 20, "--json"]
+    with Process(touchup_bin, "refine", "--live", "--web", "127.0.0.1:0", *files, *told, domain=next(domains)) as refining:
+        with Socket(page_url(refining)) as page:
+            # nothing is touched before somebody sees it
+            page.take_until(lambda: page.newest.get("tip", {}).get("markers") and page.version > 1000)
+            assert page.call("~/undo", strokes=1)["response"]["strokes"] == 1
+            page.take_until(lambda: page.call("~/pause", data=True)["response"]["success"])
+            assert refining.end() == 0, refining.text()
+    summary = json.loads(refining.out[-1])
+    assert summary["told"]["stiffness_n_per_mm"] == {"value": 20.0, "source": "scene"}
+    assert summary["accepted"] > 100 and summary["patch"]["added_faces"] > 0
+    (session,) = (tmp_path / "sessions").iterdir()
+    # the same as of the session that is left, without the stroke that was undone
+    again = touchup("refine", "--resume", session, "--out", tmp_path / "again.ply")
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "refined.ply").read_bytes()
+    assert not list(tmp_path.glob("*.yaml")) and not list(ROOT.glob("*.yaml"))
