@@ -159,7 +159,7 @@ impl Site {
 
     /// A call of a page: of the page's own, or of a service of the node.
     fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
-        let own: Option<fn(&Self, Value) -> Result<Value, String>> = match name {
+        let own: Option<OwnCall> = match name {
             "~/annotate_feature" => Some(Self::annotate),
             "~/invite" => Some(Self::invite),
             _ => None,
@@ -214,6 +214,9 @@ impl Site {
         Ok(format!("the next one may {} by {link}{code}", in_words(role)))
     }
 }
+
+/// What the page itself is asked, and not the node.
+type OwnCall = fn(&Site, Value) -> Result<Value, String>;
 
 fn in_words(role: Role) -> &'static str {
     match role {
