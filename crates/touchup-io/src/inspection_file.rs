@@ -158,26 +158,21 @@ impl CharacteristicRecord {
 }
 
 const BEFORE: [&str; 6] = ["number", "name", "kind", "feature", "datum", "quantity"];
-const BEHIND: [&str; 8] = [
-    "is_at_least",
-    "tolerance_from",
-    "decision",
-    "conformance_probability",
-    "risk",
-    "touches",
-    "fitted_to",
-    "reason",
-];
+const BEHIND: [&str; 8] =
+    ["is_at_least", "tolerance_from", "decision", "conformance_probability", "risk", "touches", "fitted_to", "reason"];
 
 /// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where there is an angle.
 ///
 /// # Errors
 /// [`FileError::Write`].
 pub fn write_inspection_table(path: &Path, characteristics: &[CharacteristicRecord]) -> Result<(), FileError> {
-    let units: Vec<_> =
-        ["mm", "deg"].into_iter().filter(|unit| *unit == "mm" || characteristics.iter().any(|one| one.unit() == *unit)).collect();
+    let units: Vec<_> = ["mm", "deg"]
+        .into_iter()
+        .filter(|unit| *unit == "mm" || characteristics.iter().any(|one| one.unit() == *unit))
+        .collect();
     let numbers = units.iter().flat_map(|unit| NUMBERS.map(|name| format!("{name}_{unit}")));
-    let header: Vec<String> = BEFORE.map(str::to_owned).into_iter().chain(numbers).chain(BEHIND.map(str::to_owned)).collect();
+    let header: Vec<String> =
+        BEFORE.map(str::to_owned).into_iter().chain(numbers).chain(BEHIND.map(str::to_owned)).collect();
     write_file(path, |out| {
         writeln!(out, "{}", csv_line(header.iter().map(String::as_str)))?;
         characteristics
@@ -191,8 +186,11 @@ mod tests {
     use super::*;
 
     fn record(name: &str, quantity: &str) -> CharacteristicRecord {
-        let mut record =
-            CharacteristicRecord { name: name.to_owned(), quantity: quantity.to_owned(), ..CharacteristicRecord::default() };
+        let mut record = CharacteristicRecord {
+            name: name.to_owned(),
+            quantity: quantity.to_owned(),
+            ..CharacteristicRecord::default()
+        };
         record.set("nominal", Some(8.0));
         record.set("actual", None);
         record

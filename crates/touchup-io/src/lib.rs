@@ -50,6 +50,7 @@ pub mod pairs_file;
 pub mod parameters_file;
 pub mod png;
 pub mod probed_touches_file;
+pub mod qif_file;
 pub mod recording;
 mod scalar;
 pub mod session_folder;

@@ -1,0 +1,174 @@
+//! The touches behind a characteristic: how far each is off the ideal surface.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::conformity::Quantity;
+use crate::io::features_file::FeatureRecord;
+use crate::io::probed_touches_file::TouchLine;
+use crate::stylus::ProbedPoint;
+
+/// Most touches that a plot draws: evenly chosen of more.
+const MOST_DRAWN: usize = 300;
+
+/// Touches on a surface.
+pub(super) struct TouchEvidence {
+    /// what the distances are from
+    pub ideal: &'static str,
+    /// what the touches are arranged by
+    pub along: &'static str,
+    /// of the touches that are drawn: along, and off the ideal surface, mm
+    pub drawn: Vec<[f64; 2]>,
+    pub count: usize,
+    /// root mean square of all distances, mm
+    pub rms_mm: f64,
+    /// largest distance, mm
+    pub largest_mm: f64,
+    /// noise of a single touch as the measurement states it, root mean square, mm
+    pub stated_mm: f64,
+}
+
+/// How far the touches behind a quantity are off the surface that was fitted to them; `None` where that surface is not in the file.
+pub(super) fn touch_evidence(
+    quantity: Quantity,
+    feature: &FeatureRecord,
+    runs: &[[u32; 2]],
+    touches: &[ProbedPoint],
+) -> Option<TouchEvidence> {
+    let centre = Point3::from(feature.center_mm?);
+    let axis = Vector3::from(feature.axis?);
+    let numbers = runs.iter().flat_map(|[first, last]| *first..=*last);
+    let all: Vec<&ProbedPoint> = numbers.map(|number| touches.get(number as usize)).collect::<Option<_>>()?;
+    if all.is_empty() {
+        return None;
+    }
+    let seat = |touch: &ProbedPoint| touch.point * 1e3 - centre;
+    let order = |at: usize| at as f64;
+    let (ideal, along, places): (_, _, Vec<[f64; 2]>) = match (quantity, feature.diameter_mm, feature.width_mm) {
+        (Quantity::Depth, ..) => {
+            let depth = feature.depth_mm?;
+            let level = if matches!(&*feature.kind, "boss" | "cylinder") { depth } else { -depth };
+            let off = |touch: &ProbedPoint| {
+                let height = seat(touch).dot(&axis);
+                if height.abs() < (height - level).abs() { height } else { height - level }
+            };
+            let places = all.iter().enumerate().map(|(at, touch)| [order(at), off(touch)]).collect();
+            ("the two planes", "touch, in order of time", places)
+        }
+        (_, Some(diameter), _) => {
+            let [u, v] = across(&axis);
+            let place = |touch: &&ProbedPoint| {
+                let off = seat(touch);
+                let [x, y] = [off.dot(&u), off.dot(&v)];
+                [y.atan2(x).to_degrees(), x.hypot(y) - diameter / 2.0]
+            };
+            ("the fitted cylinder", "angle about the axis, °", all.iter().map(place).collect())
+        }
+        (_, None, Some(width)) => {
+            let length = feature.length_mm?;
+            let u = Vector3::from(feature.direction?);
+            let v = axis.cross(&u);
+            let is_slot = feature.kind == "slot";
+            let place = |touch: &&ProbedPoint| {
+                let off = seat(touch);
+                let [x, y] = [off.dot(&u), off.dot(&v)];
+                let round = x - x.clamp(-(length - width) / 2.0, (length - width) / 2.0);
+                let (side, end) = (y.abs() - width / 2.0, x.abs() - length / 2.0);
+                let straight = if side.abs() < end.abs() { side } else { end };
+                [x, if is_slot { round.hypot(y) - width / 2.0 } else { straight }]
+            };
+            ("the fitted walls", "along the slot, mm", all.iter().map(place).collect())
+        }
+        _ if feature.kind == "plane" => {
+            let places = all.iter().enumerate().map(|(at, touch)| [order(at), seat(touch).dot(&axis)]).collect();
+            ("the fitted plane", "touch, in order of time", places)
+        }
+        _ => return None,
+    };
+    let mean_square = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>() / all.len() as f64;
+    Some(TouchEvidence {
+        ideal,
+        along,
+        count: all.len(),
+        rms_mm: mean_square(&mut places.iter().map(|[_, off]| *off)).sqrt(),
+        largest_mm: places.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max),
+        stated_mm: mean_square(&mut all.iter().map(|touch| touch.sigma * 1e3)).sqrt(),
+        drawn: places.iter().step_by(places.len().div_ceil(MOST_DRAWN)).copied().collect(),
+    })
+}
+
+/// Two directions across an axis.
+fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let u = (other - axis * axis.dot(&other)).normalize();
+    [u, axis.cross(&u)]
+}
+
+/// The touches of an arm among which those behind a characteristic were recorded.
+pub(super) fn probed_behind<'a>(
+    probed: &'a [TouchLine],
+    runs: &[[u32; 2]],
+    touches: &[ProbedPoint],
+) -> Vec<&'a TouchLine> {
+    let stamps: Vec<i64> = runs
+        .iter()
+        .flat_map(|[first, last]| *first..=*last)
+        .filter_map(|number| touches.get(number as usize).map(|touch| touch.stamp_ns))
+        .collect();
+    let is_behind = |touch: &&TouchLine| {
+        touch
+            .begun_ns
+            .zip(touch.ended_ns)
+            .is_some_and(|(begun, ended)| stamps.iter().any(|stamp| (begun..=ended).contains(stamp)))
+    };
+    probed.iter().filter(is_behind).collect()
+}
+
+/// Turns that touches leave out of a round wall, degrees: the widest gap.
+pub(super) fn widest_gap_deg(angles_deg: &[[f64; 2]]) -> f64 {
+    let mut angles: Vec<f64> = angles_deg.iter().map(|[angle, _]| angle.to_radians()).collect();
+    angles.sort_by(f64::total_cmp);
+    let Some((first, last)) = angles.first().zip(angles.last()) else { return 360.0 };
+    let wrapped = first + 2.0 * PI - last;
+    angles.windows(2).map(|pair| pair[1] - pair[0]).fold(wrapped, f64::max).to_degrees()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn touch(x_mm: f64, y_mm: f64, z_mm: f64) -> ProbedPoint {
+        let point = Point3::new(x_mm, y_mm, z_mm) * 1e-3;
+        ProbedPoint { point, sigma: 10e-6, ..ProbedPoint::default() }
+    }
+
+    fn hole() -> FeatureRecord {
+        let json = r#"{"id": 1, "kind": "hole", "center_mm": [10, 20, 0], "axis": [0, 0, 1], "diameter_mm": 8, "depth_mm": 5}"#;
+        serde_json::from_str(json).unwrap()
+    }
+
+    #[test]
+    fn a_touch_outside_of_the_fitted_cylinder_is_off_by_its_distance() {
+        let touches = [touch(14.01, 20.0, -1.0), touch(10.0, 23.98, -2.0)];
+        let found = touch_evidence(Quantity::Diameter, &hole(), &[[0, 1]], &touches).unwrap();
+        let off: Vec<f64> = found.drawn.iter().map(|[_, off]| *off).collect();
+        assert!((off[0] - 0.01).abs() < 1e-9 && (off[1] + 0.02).abs() < 1e-9, "{off:?}");
+        assert!((found.rms_mm - ((0.01f64.powi(2) + 0.02f64.powi(2)) / 2.0).sqrt()).abs() < 1e-9);
+        assert!((found.stated_mm - 0.01).abs() < 1e-12);
+        assert!((widest_gap_deg(&found.drawn) - 270.0).abs() < 0.5);
+    }
+
+    #[test]
+    fn touches_of_a_depth_belong_to_opening_or_floor() {
+        let touches = [touch(0.0, 0.0, 0.003), touch(10.0, 20.0, -5.002)];
+        let found = touch_evidence(Quantity::Depth, &hole(), &[[0, 1]], &touches).unwrap();
+        let off: Vec<f64> = found.drawn.iter().map(|[_, off]| (off * 1e6).round() / 1e6).collect();
+        assert_eq!(off, [0.003, -0.002]);
+    }
+
+    #[test]
+    fn touches_that_are_not_in_the_file_give_no_plot() {
+        assert!(touch_evidence(Quantity::Diameter, &hole(), &[[0, 5]], &[touch(14.0, 20.0, 0.0)]).is_none());
+    }
+}
