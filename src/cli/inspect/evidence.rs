@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::conformity::Quantity;
 use crate::io::features_file::FeatureRecord;
@@ -49,12 +49,13 @@ pub(super) fn touch_evidence(
         (Quantity::Depth, ..) => {
             let depth = feature.depth_mm?;
             let level = if matches!(&*feature.kind, "boss" | "cylinder") { depth } else { -depth };
-            let off = |touch: &ProbedPoint| {
-                let height = seat(touch).dot(&axis);
-                if height.abs() < (height - level).abs() { height } else { height - level }
-            };
-            let places = all.iter().enumerate().map(|(at, touch)| [order(at), off(touch)]).collect();
-            ("the two planes", "touch, in order of time", places)
+            let seats: Vec<_> = all.iter().map(|touch| seat(touch)).collect();
+            let offs = off_two_planes(&seats, &axis, level);
+            (
+                "a plane at either end",
+                "touch, in order of time",
+                offs.into_iter().enumerate().map(|(at, off)| [order(at), off]).collect(),
+            )
         }
         (_, Some(diameter), _) => {
             let [u, v] = across(&axis);
@@ -96,6 +97,27 @@ pub(super) fn touch_evidence(
         stated_mm: mean_square(&mut all.iter().map(|touch| touch.sigma * 1e3)).sqrt(),
         drawn: places.iter().step_by(places.len().div_ceil(MOST_DRAWN)).copied().collect(),
     })
+}
+
+/// Of each point the distance along the axis from the plane of least squares through those of its end, mm.
+///
+/// - `level`: height of the other end along the axis.
+fn off_two_planes(seats: &[Vector3<f64>], axis: &Vector3<f64>, level: f64) -> Vec<f64> {
+    let [u, v] = across(axis);
+    let is_far = |seat: &Vector3<f64>| seat.dot(axis).abs() > (seat.dot(axis) - level).abs();
+    let row = |seat: &Vector3<f64>| Vector3::new(1.0, seat.dot(&u), seat.dot(&v));
+    let plane = |far: bool| {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for seat in seats.iter().filter(|seat| is_far(seat) == far) {
+            normal += row(seat) * row(seat).transpose();
+            right += row(seat) * seat.dot(axis);
+        }
+        // fewer than three points, or those of a line, have their mean height
+        let mean = Vector3::new(right.x / normal.m11.max(1.0), 0.0, 0.0);
+        normal.cholesky().map_or(mean, |factor| factor.solve(&right))
+    };
+    let planes = [plane(false), plane(true)];
+    seats.iter().map(|seat| seat.dot(axis) - row(seat).dot(&planes[usize::from(is_far(seat))])).collect()
 }
 
 /// Two directions across an axis.
@@ -159,12 +181,16 @@ mod tests {
         assert!((widest_gap_deg(&found.drawn) - 270.0).abs() < 0.5);
     }
 
+    /// Opening and floor lean off the axis: each has a plane of its own, and the point above one is off by its height.
     #[test]
-    fn touches_of_a_depth_belong_to_opening_or_floor() {
-        let touches = [touch(0.0, 0.0, 0.003), touch(10.0, 20.0, -5.002)];
-        let found = touch_evidence(Quantity::Depth, &hole(), &[[0, 1]], &touches).unwrap();
-        let off: Vec<f64> = found.drawn.iter().map(|[_, off]| (off * 1e6).round() / 1e6).collect();
-        assert_eq!(off, [0.003, -0.002]);
+    fn touches_of_a_depth_are_off_the_plane_of_their_end() {
+        let corners = [(0.0, 0.0), (9.0, 0.0), (0.0, 9.0), (9.0, 9.0)];
+        let opening = corners.map(|(x, y)| touch(x, y, 0.01 * x));
+        let floor = corners.map(|(x, y)| touch(x, y, -5.0 + if x == y { 0.002 } else { -0.002 }));
+        let touches: Vec<_> = opening.into_iter().chain(floor).collect();
+        let found = touch_evidence(Quantity::Depth, &hole(), &[[0, 7]], &touches).unwrap();
+        let off: Vec<f64> = found.drawn.iter().map(|[_, off]| (off * 1e6).round() / 1e6 + 0.0).collect();
+        assert_eq!(off, [0.0, 0.0, 0.0, 0.0, 0.002, -0.002, -0.002, 0.002]);
     }
 
     #[test]

@@ -57,9 +57,9 @@ pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {
     let risk = match (&*one.decision, one.conformance_probability) {
         (_, None) => String::new(),
         ("undecided", Some(p)) => {
-            format!("wrong if accepted: {}, if rejected: {}", probability(1.0 - p), probability(p))
+            format!("risk if accepted {}, if rejected {}", probability(1.0 - p), probability(p))
         }
-        (_, Some(_)) => format!("wrong: {}", probability(one.risk.unwrap_or_default())),
+        (_, Some(_)) => format!("risk {}", probability(one.risk.unwrap_or_default())),
     };
     let why = one.reason.as_ref().map_or(String::new(), |why| format!("<span class=\"why\">{}</span>", escaped(why)));
     let from =
@@ -100,6 +100,6 @@ pub(super) fn table(inspected: &Inspected) -> String {
     let rows: Vec<_> = record.characteristics.iter().map(table_row).collect();
     let key = "<p class=\"small\">Lengths in mm, angles in degrees. The number before the point is that of the balloon in the picture. Bar: grey is the tolerance zone \
                between its limits, green the acceptance zone that the guard bands leave, dot and line the measured value with ± U; ◀ ▶ beyond the drawing. ≥: a lower \
-               bound, the end was not touched. Wrong: the probability that the decision is wrong.</p>\n";
+               bound, the end was not touched. Risk: the probability that the decision is wrong.</p>\n";
     format!("<h2>Characteristics</h2>\n<div class=\"scroll\">{}</div>\n{key}", html_table("num", &head, &rows))
 }

@@ -35,7 +35,7 @@ impl Axes {
         let (left, right) = (LEFT, SIZE[0] - 6.0);
         for y in [self.y[0], (self.y[0] + self.y[1]) / 2.0, self.y[1]] {
             let at = self.y(y);
-            let number = format!("{y:.*}", digits[1]).replace('-', "−");
+            let number = shown(y, digits[1]);
             let _ = write!(
                 svg,
                 "<path d=\"M{left} {at:.1} H{right}\" stroke=\"#c9ced8\" stroke-width=\".7\"/><text x=\"{:.1}\" y=\"{:.1}\" font-size=\"8.5\" text-anchor=\"end\" fill=\"#4a5160\">{number}</text>",
@@ -44,7 +44,7 @@ impl Axes {
             );
         }
         for (x, anchor) in [(self.x[0], "start"), ((self.x[0] + self.x[1]) / 2.0, "middle"), (self.x[1], "end")] {
-            let number = format!("{x:.*}", digits[0]).replace('-', "−");
+            let number = shown(x, digits[0]);
             let _ = write!(
                 svg,
                 "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"8.5\" text-anchor=\"{anchor}\" fill=\"#4a5160\">{number}</text>",
@@ -65,6 +65,16 @@ impl Axes {
             "<text x=\"9\" y=\"{middle:.1}\" font-size=\"9\" text-anchor=\"middle\" fill=\"#1d2129\" transform=\"rotate(-90 9 {middle:.1})\">{}</text>",
             names[1]
         );
+    }
+}
+
+/// A number with the sign of mathematics, and none of 0.
+fn shown(number: f64, digits: usize) -> String {
+    let text = format!("{number:.digits$}");
+    if text.trim_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text.replace('-', "−")
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) fn rule_name(record: &InspectionRecord) -> String {
     let percent = crate::cli::inspect::summary::percent(record.confidence);
     match &*record.rule {
         "simple" => "simple acceptance, no guard bands".to_owned(),
-        _ => format!("ISO 14253-1, guard bands, {percent} %"),
+        _ => format!("ISO 14253-1, guard bands, {percent}\u{a0}%"),
     }
 }
 
@@ -131,7 +131,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     }
     if !all.is_empty() {
         html += "<h3>Relations</h3>\n";
-        html += &table("", &["Relation", "Of", "To", "Numbers"], &all[..all.len().min(MOST_RELATIONS)]);
+        html += &table("rel", &["Relation", "Of", "To", "Numbers"], &all[..all.len().min(MOST_RELATIONS)]);
     }
     if all.len() > MOST_RELATIONS {
         html += &format!(
@@ -145,7 +145,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
 pub(super) fn calibration(lines: &[CalibrationLine]) -> String {
     let rows: Vec<_> =
         lines.iter().map(|line| vec![line.what.to_owned(), escaped(&line.value), escaped(&line.state)]).collect();
-    format!("<h2>State of the calibration</h2>\n{}", table("", &["What", "Value", "State and age"], &rows))
+    format!("<h2>State of the calibration</h2>\n{}", table("cal", &["What", "Value", "State and age"], &rows))
 }
 
 pub(super) fn files(record: &InspectionRecord) -> String {
@@ -159,13 +159,13 @@ pub(super) fn files(record: &InspectionRecord) -> String {
     };
     let rows: Vec<_> = record.files.iter().map(row).collect();
     let note = "<p class=\"small\">The checksum tells files apart that were mixed up; it is no seal against who wants to deceive.</p>\n";
-    format!("<h2>Files</h2>\n{}{note}", table("", &["What", "File", "Bytes", "CRC-32"], &rows))
+    format!("<h2>Files</h2>\n{}{note}", table("files", &["What", "File", "Bytes", "CRC-32"], &rows))
 }
 
 pub(super) fn limits() -> String {
     let limits = [
         "An uncertainty holds when radius of the ball, stiffness, calibration, place of the scan and noise are as told when it was measured. A wrong value there \
-         gives wrong measured values with a small uncertainty; `touchup doctor`, `disagree` and `check` find some of them.",
+         gives wrong measured values with a small uncertainty; <code>touchup doctor</code>, <code>disagree</code> and <code>check</code> find some of them.",
         "The uncertainty is that of the touches. Temperature of the part, deformation by clamping and by the force of the touch beyond the told stiffness are not in it.",
         "A probability of conformity takes nothing for granted but the measurement: what the process usually makes is not counted in.",
         "Form and relations are those of what was touched; of the rest nothing is said.",
