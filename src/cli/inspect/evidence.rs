@@ -162,7 +162,19 @@ mod tests {
 
     fn touch(x_mm: f64, y_mm: f64, z_mm: f64) -> ProbedPoint {
         let point = Point3::new(x_mm, y_mm, z_mm) * 1e-3;
-        ProbedPoint { point, sigma: 10e-6, ..ProbedPoint::default() }
+        ProbedPoint {
+            stamp_ns: 0,
+            stroke: 0,
+            centre: point,
+            radius: 0.0,
+            point,
+            normal: Vector3::z(),
+            sigma: 10e-6,
+            calibration: 0.0,
+            place: 0.0,
+            weight: 1.0,
+            is_rejected: false,
+        }
     }
 
     fn hole() -> FeatureRecord {

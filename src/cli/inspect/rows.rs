@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use chrono::{SecondsFormat, Utc};
 use nalgebra::{Point3, Vector3};
 
-use super::InspectArguments;
+use super::arguments::InspectArguments;
 use super::drawing::{Drawing, Drawn};
 use super::measured::{Measurement, measurement};
 use super::source::Source;
@@ -277,6 +277,6 @@ fn record_of(
         files: files.collect(),
         characteristics,
         without_characteristic: without,
-        notes: drawing.notes.clone(),
+        notes: source.notes.iter().chain(&drawing.notes).cloned().collect(),
     }
 }

@@ -58,11 +58,23 @@ fn row(one: &CharacteristicRecord, width: usize) -> String {
     )
 }
 
+/// Most names in a line.
+const MOST_NAMED: usize = 8;
+
+/// The first names, and how many more there are.
+pub(super) fn first_few(names: &[String], between: &str) -> String {
+    let shown = names.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(between);
+    match names.len().saturating_sub(MOST_NAMED) {
+        0 => shown,
+        more => format!("{shown}{between}and {more} more"),
+    }
+}
+
 /// What was not proved to conform, in one line; empty: all was.
 pub(super) fn losses(record: &InspectionRecord) -> Losses {
     let named = |decision: Decision, said: &str| {
         let names: Vec<_> = record.characteristics.iter().filter(|one| one.decision == decision.name()).collect();
-        let all = names.iter().map(|one| one.name.as_str()).collect::<Vec<_>>().join(", ");
+        let all = first_few(&names.iter().map(|one| one.name.clone()).collect::<Vec<_>>(), ", ");
         let count = record.characteristics.len();
         (!names.is_empty()).then(|| format!("{} of {count} {said}: {all}", names.len()))
     };

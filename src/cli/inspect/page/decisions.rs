@@ -6,14 +6,30 @@ use crate::cli::inspect::rows::Inspected;
 use crate::conformity::Quantity;
 use crate::io::inspection_file::CharacteristicRecord;
 
+/// How a decision looks.
+pub(super) struct DecisionLook {
+    /// of its field
+    pub fill: &'static str,
+    /// of its letters
+    pub ink: &'static str,
+    /// beside its word
+    pub sign: &'static str,
+}
+
+/// Bluish green, vermillion and yellow: told apart without red or green as well, and each has its sign and its word.
+pub(super) fn look_of(decision: &str) -> DecisionLook {
+    match decision {
+        "pass" => DecisionLook { fill: "#00735a", ink: "#ffffff", sign: "✓" },
+        "fail" => DecisionLook { fill: "#b94a00", ink: "#ffffff", sign: "✗" },
+        _ => DecisionLook { fill: "#f3e26b", ink: "#1d2129", sign: "?" },
+    }
+}
+
 /// A decision as a word with its sign.
 pub(super) fn chip(decision: &str) -> String {
-    let sign = match decision {
-        "pass" => "✓",
-        "fail" => "✗",
-        _ => "?",
-    };
-    format!("<span class=\"chip {decision}\">{sign} {}</span>", decision.to_uppercase())
+    let DecisionLook { fill, ink, sign } = look_of(decision);
+    let word = decision.to_uppercase();
+    format!("<span class=\"chip {decision}\" style=\"background:{fill};color:{ink}\">{sign} {word}</span>")
 }
 
 /// A number with the digits that a drawing has; none: a dash.
@@ -52,7 +68,7 @@ pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {
         (None, _) => format!("≤ {}", number("upper_limit")),
     };
     let bound = if one.is_at_least { "≥ " } else { "" };
-    let actual = one.number("actual").map_or("not measured".to_owned(), |_| format!("{bound}{}", number("actual")));
+    let actual = one.number("actual").map_or("–".to_owned(), |_| format!("{bound}{}", number("actual")));
     let deviation = one.number("deviation").map_or("–".to_owned(), |off| minus(&format!("{off:+.3}")));
     let risk = match (&*one.decision, one.conformance_probability) {
         (_, None) => String::new(),
@@ -102,4 +118,26 @@ pub(super) fn table(inspected: &Inspected) -> String {
                between its limits, green the acceptance zone that the guard bands leave, dot and line the measured value with ± U; ◀ ▶ beyond the drawing. ≥: a lower \
                bound, the end was not touched. Risk: the probability that the decision is wrong.</p>\n";
     format!("<h2>Characteristics</h2>\n<div class=\"scroll\">{}</div>\n{key}", html_table("num", &head, &rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colour_vision::least_difference;
+    use crate::conformity::Decision;
+
+    /// 10 is a difference that nobody overlooks side by side.
+    #[test]
+    fn decisions_are_told_apart_by_who_lacks_a_cone() {
+        let byte = |hex: &str, at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
+        let colours = Decision::ALL
+            .map(|decision| look_of(decision.name()).fill)
+            .map(|hex| [byte(hex, 1), byte(hex, 3), byte(hex, 5)]);
+        assert!(least_difference(&colours) > 10.0, "{}", least_difference(&colours));
+    }
+
+    #[test]
+    fn a_probability_is_never_rounded_to_certainty() {
+        assert_eq!([0.9999, 0.5, 1e-9].map(probability), ["&gt; 99.9 %", "50.0 %", "&lt; 0.1 %"]);
+    }
 }

@@ -2,6 +2,7 @@
 
 mod decisions;
 mod html;
+mod input;
 mod picture;
 mod plots;
 mod rule;
@@ -13,26 +14,10 @@ mod touches;
 use std::io::{self, Write};
 use std::path::Path;
 
-use nalgebra::Vector3;
-
 use self::html::{css_string, escaped};
-use super::calibration::CalibrationLine;
-use super::rows::Inspected;
-use super::source::Source;
+pub(super) use self::input::ReportInput;
 use crate::cli::CliError;
 use crate::io::atomic::write_atomically;
-use crate::io::mesh_file::MeshUnit;
-
-/// What a report is made of.
-pub(super) struct ReportInput<'a> {
-    pub inspected: &'a Inspected,
-    pub source: &'a Source,
-    pub calibration: &'a [CalibrationLine],
-    /// of the mesh of the picture
-    pub mesh_unit: MeshUnit,
-    /// from where the picture is taken
-    pub view: Option<Vector3<f64>>,
-}
 
 /// The whole page.
 pub(super) fn page(input: &ReportInput<'_>) -> Result<String, CliError> {

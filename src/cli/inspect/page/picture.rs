@@ -5,8 +5,9 @@ use std::fmt::Write;
 
 use nalgebra::Point3;
 
-use super::ReportInput;
+use super::decisions::{DecisionLook, look_of};
 use super::html::base64;
+use super::input::ReportInput;
 use crate::cli::{CliError, not_written};
 use crate::compare::{PartView, PicturePanel, PictureParams, Rgb, draw_part};
 use crate::conformity::Decision;
@@ -55,6 +56,9 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, CliError> {
         height + 2.0 * MARGIN,
         base64(&png)
     );
+    let is_inside = |[x, y]: &[f64; 2]| (0.0..=width).contains(x) && (0.0..=height).contains(y);
+    let (placed, places): (Vec<_>, Vec<_>) =
+        placed.into_iter().zip(places).filter(|(_, place)| is_inside(place)).unzip();
     let seats = balloon_seats(&places, [width, height]);
     for ((balloon, place), seat) in placed.iter().zip(&places).zip(&seats) {
         let decisions = balloon.characteristics.iter().map(|&at| &*input.inspected.record.characteristics[at].decision);
@@ -65,7 +69,8 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, CliError> {
     }
     svg += "</svg>";
     let unseen = input.inspected.balloons.len() - placed.len();
-    let unseen = if unseen == 0 { String::new() } else { format!(" {unseen} without a place are not drawn.") };
+    let unseen =
+        if unseen == 0 { String::new() } else { format!(" {unseen} without a place on the mesh are not drawn.") };
     let caption = format!(
         "Blue was touched, grey is the scan. A balloon has the colour and sign of the worst decision of its feature; dashed: not found, at its nominal place.{unseen}"
     );
@@ -73,11 +78,7 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, CliError> {
 }
 
 fn draw_balloon(svg: &mut String, number: usize, decision: &str, is_found: bool, [x, y]: [f64; 2], [u, v]: [f64; 2]) {
-    let (fill, ink, sign) = match decision {
-        "pass" => ("#00735a", "#fff", "✓"),
-        "fail" => ("#b94a00", "#fff", "✗"),
-        _ => ("#f3e26b", "#1d2129", "?"),
-    };
+    let DecisionLook { fill, ink, sign } = look_of(decision);
     let dash = if is_found { "" } else { " stroke-dasharray=\"6 4\"" };
     let _ = write!(
         svg,

@@ -1,10 +1,11 @@
 //! Head, verdict, form and relations, calibration, files, limits.
 
-use super::ReportInput;
 use super::decisions::{in_words, shown};
 use super::html::{escaped, table};
+use super::input::ReportInput;
 use crate::cli::inspect::calibration::CalibrationLine;
 use crate::cli::inspect::measured::relation_number;
+use crate::cli::inspect::summary::first_few;
 use crate::conformity::{Decision, MeasuredNumber, Quantity};
 use crate::io::inspection_file::InspectionRecord;
 
@@ -43,7 +44,8 @@ pub(super) fn verdict(record: &InspectionRecord) -> String {
     };
     let names = |decision: Decision| {
         let of_it = record.characteristics.iter().filter(|one| one.decision == decision.name());
-        of_it.map(|one| format!("{} {}", escaped(&one.number), escaped(&one.name))).collect::<Vec<_>>().join("; ")
+        let all: Vec<_> = of_it.map(|one| format!("{} {}", escaped(&one.number), escaped(&one.name))).collect();
+        first_few(&all, "; ")
     };
     let said = |decision: Decision, what: &str| match names(decision) {
         names if names.is_empty() => String::new(),

@@ -1,6 +1,6 @@
 //! How the report looks, on a screen and on A4.
 
-/// Bluish green, vermillion and yellow are told apart also without red or green, and each has its word and sign.
+/// The style sheet: it asks for nothing outside of the page.
 pub(super) const CSS: &str = "\
 @page { size: A4; margin: 14mm 14mm 17mm; @bottom-right { content: \"page \" counter(page) \" of \" counter(pages); } }
 @page { @bottom-left { font: 7.5pt system-ui, sans-serif; color: #555; } @bottom-right { font: 7.5pt system-ui, sans-serif; color: #555; } }
@@ -30,12 +30,11 @@ code { font: 8pt ui-monospace, monospace; }
 .verdict.pass { border-color: #00735a; background: #e7f4f0; } .verdict.fail { border-color: #b94a00; background: #fcefe6; }
 .verdict.undecided { border-color: #6b5c00; background: #fdf8dc; }
 .chip { display: inline-block; white-space: nowrap; font-weight: 700; padding: .3mm 1.6mm; border-radius: .8mm; }
-.chip.pass { background: #00735a; color: #fff; } .chip.fail { background: #b94a00; color: #fff; }
-.chip.undecided { background: #f3e26b; color: #1d2129; border: .2mm dashed #1d2129; }
+.chip.undecided { border: .2mm dashed #1d2129; }
 .why { display: block; font-size: 7.5pt; color: #1d2129; margin-top: .6mm; }
 .num td:nth-child(n+3):nth-child(-n+7), .num th:nth-child(n+3):nth-child(-n+7) { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
-.num th:nth-child(1) { width: 9mm; } .num th:nth-child(3) { width: 19mm; } .num th:nth-child(4), .num th:nth-child(5), .num th:nth-child(6) { width: 16.5mm; }
-.num th:nth-child(7) { width: 13mm; } .num th:nth-child(8) { width: 31mm; } .num th:nth-child(9) { width: 36mm; }
+.num th:nth-child(1) { width: 9mm; } .num th:nth-child(3) { width: 19mm; } .num th:nth-child(4), .num th:nth-child(5) { width: 14.5mm; }
+.num th:nth-child(6) { width: 17mm; } .num th:nth-child(7) { width: 13mm; } .num th:nth-child(8) { width: 30mm; } .num th:nth-child(9) { width: 33mm; }
 .num svg { width: 28mm; }
 .unit { color: #4a5160; }
 figure { margin: 3mm 0; break-inside: avoid; } figcaption { font-size: 8pt; color: #4a5160; margin-top: 1mm; }

@@ -1,8 +1,8 @@
 //! The touches behind each number.
 
-use super::ReportInput;
 use super::decisions::in_words;
 use super::html::{escaped, table};
+use super::input::ReportInput;
 use super::plots::{force_plot, residual_plot};
 use crate::cli::counted;
 use crate::cli::inspect::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
@@ -16,16 +16,20 @@ pub(super) fn touches(input: &ReportInput<'_>) -> String {
         return format!("<h2>Touches behind the numbers</h2>\n{why}");
     }
     let balloons = input.inspected.balloons.iter();
-    let parts: String = balloons.map(|balloon| feature(input, balloon)).collect();
+    let parts: String = balloons.clone().map(|balloon| feature(input, balloon)).collect();
+    let missing = balloons.filter(|balloon| balloon.feature.is_none());
+    let missing: Vec<_> = missing.map(|balloon| format!("{} · {}", balloon.number, escaped(&balloon.kind))).collect();
+    let missing = match missing.len() {
+        0 => String::new(),
+        _ => format!("<p class=\"small\">Not found, so without touches: {}.</p>\n", missing.join(", ")),
+    };
     let note = "<p class=\"small\">Blue band: ± 2 standard deviations of a single touch as the measurement states them. Of many touches evenly chosen ones are drawn; the numbers are of all.</p>\n";
-    format!("<h2>Touches behind the numbers</h2>\n{note}{parts}")
+    format!("<h2>Touches behind the numbers</h2>\n{note}{missing}{parts}")
 }
 
 fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
-    let Some(found) = balloon.feature.and_then(|id| input.source.features.features.iter().find(|one| one.id == id))
-    else {
-        return format!("<h3>{} · {}: not found</h3>\n", balloon.number, escaped(&balloon.kind));
-    };
+    let of_balloon = balloon.feature.and_then(|id| input.source.features.features.iter().find(|one| one.id == id));
+    let Some(found) = of_balloon else { return String::new() };
     let mut rows = Vec::new();
     let mut figures = String::new();
     let mut drawn: Vec<(&[[u32; 2]], bool)> = Vec::new();
