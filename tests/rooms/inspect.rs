@@ -113,7 +113,7 @@ fn what_is_not_known_is_undecided_with_its_reason() {
     let rows = [
         "of the mesh,hole,diameter_mm,5,0.1,,,60,10,12",
         "bound,hole,depth_mm,8,0.2,,,32,34,12",
-        "beyond,hole,length_mm,8,0.2,,,32,34,12",
+        "beyond,hole,depth_mm,8,0.2,,,16,36,12",
         "far off,hole,diameter_mm,8,0.2,,,5,5,12",
     ];
     let found = Part::new().characteristics(&rows, &[]);

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::file_error::{FileError, write_file};
 use super::inspection_file::{CharacteristicRecord, InspectionRecord};
-use touchup_core::conformity::Quantity;
+use touchup_core::conformity::InspectedQuantity;
 
 /// Writes an inspection, as a whole or not at all.
 ///
@@ -107,25 +107,25 @@ fn document(record: &InspectionRecord) -> String {
 
 /// What the characteristic is called in QIF.
 fn name_of(one: &CharacteristicRecord) -> &'static str {
-    match Quantity::of(&one.quantity) {
-        Some(Quantity::Diameter) | None => "Diameter",
-        Some(Quantity::Width) => "Width",
-        Some(Quantity::Length) => "Length",
-        Some(Quantity::Depth) if one.kind == "boss" => "Height",
-        Some(Quantity::Depth) => "Depth",
-        Some(Quantity::ConeAngle) => "Angle",
-        Some(Quantity::X | Quantity::Y | Quantity::Z) => "LinearCoordinate",
-        Some(Quantity::Position) => "Position",
-        Some(Quantity::Roundness) => "Circularity",
-        Some(Quantity::Cylindricity) => "Cylindricity",
-        Some(Quantity::Straightness) => "Straightness",
-        Some(Quantity::Flatness) => "Flatness",
-        Some(Quantity::Perpendicularity) => "Perpendicularity",
-        Some(Quantity::Parallelism) => "Parallelism",
-        Some(Quantity::Coaxiality) => "Coaxiality",
-        Some(Quantity::Concentricity) => "Concentricity",
-        Some(Quantity::Distance) => "DistanceBetween",
-        Some(Quantity::Angle) => "AngleBetween",
+    match InspectedQuantity::of(&one.quantity) {
+        Some(InspectedQuantity::Diameter) | None => "Diameter",
+        Some(InspectedQuantity::Width) => "Width",
+        Some(InspectedQuantity::Length) => "Length",
+        Some(InspectedQuantity::Depth) if one.kind == "boss" => "Height",
+        Some(InspectedQuantity::Depth) => "Depth",
+        Some(InspectedQuantity::ConeAngle) => "Angle",
+        Some(InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z) => "LinearCoordinate",
+        Some(InspectedQuantity::Position) => "Position",
+        Some(InspectedQuantity::Roundness) => "Circularity",
+        Some(InspectedQuantity::Cylindricity) => "Cylindricity",
+        Some(InspectedQuantity::Straightness) => "Straightness",
+        Some(InspectedQuantity::Flatness) => "Flatness",
+        Some(InspectedQuantity::Perpendicularity) => "Perpendicularity",
+        Some(InspectedQuantity::Parallelism) => "Parallelism",
+        Some(InspectedQuantity::Coaxiality) => "Coaxiality",
+        Some(InspectedQuantity::Concentricity) => "Concentricity",
+        Some(InspectedQuantity::Distance) => "DistanceBetween",
+        Some(InspectedQuantity::Angle) => "AngleBetween",
     }
 }
 
@@ -136,7 +136,7 @@ fn aspect(one: &CharacteristicRecord, aspect: &str, id: usize, content: &str) ->
 }
 
 fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
-    let is_zone = Quantity::of(&one.quantity).is_some_and(Quantity::is_zone);
+    let is_zone = InspectedQuantity::of(&one.quantity).is_some_and(InspectedQuantity::is_zone);
     let (lower, upper) = (one.number("lower_limit"), one.number("upper_limit"));
     let content = if is_zone {
         let width = format!("<ToleranceValue>{}</ToleranceValue>", upper.unwrap_or(0.0));
@@ -163,15 +163,15 @@ fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
 
 fn nominal(one: &CharacteristicRecord, ids: &Ids) -> String {
     let mut content = format!("<CharacteristicDefinitionId>{}</CharacteristicDefinitionId>", ids.definition);
-    let quantity = Quantity::of(&one.quantity);
-    if !quantity.is_some_and(Quantity::is_zone) {
+    let quantity = InspectedQuantity::of(&one.quantity);
+    if !quantity.is_some_and(InspectedQuantity::is_zone) {
         let _ = write!(content, "<TargetValue>{}</TargetValue>", one.number("nominal").unwrap_or(0.0));
     }
     content += match quantity {
-        Some(Quantity::X) => "<Direction>XAXIS</Direction>",
-        Some(Quantity::Y) => "<Direction>YAXIS</Direction>",
-        Some(Quantity::Z) => "<Direction>ZAXIS</Direction>",
-        Some(Quantity::Distance | Quantity::Angle) => "<AnalysisMode>THREEDIMENSIONAL</AnalysisMode>",
+        Some(InspectedQuantity::X) => "<Direction>XAXIS</Direction>",
+        Some(InspectedQuantity::Y) => "<Direction>YAXIS</Direction>",
+        Some(InspectedQuantity::Z) => "<Direction>ZAXIS</Direction>",
+        Some(InspectedQuantity::Distance | InspectedQuantity::Angle) => "<AnalysisMode>THREEDIMENSIONAL</AnalysisMode>",
         _ => "",
     };
     aspect(one, "Nominal", ids.nominal, &content)
@@ -271,7 +271,7 @@ mod tests {
     use super::*;
 
     fn record() -> InspectionRecord {
-        let characteristic = |quantity: &Quantity| {
+        let characteristic = |quantity: &InspectedQuantity| {
             let mut one = CharacteristicRecord {
                 number: "1.1".to_owned(),
                 name: format!("a <b> & \"c\" {quantity}"),
@@ -285,7 +285,7 @@ mod tests {
             numbers.into_iter().for_each(|(name, number)| one.set(name, Some(number)));
             one
         };
-        let characteristics = Quantity::ALL.iter().map(characteristic).collect();
+        let characteristics = InspectedQuantity::ALL.iter().map(characteristic).collect();
         InspectionRecord { characteristics, verdict: "undecided".to_owned(), ..InspectionRecord::default() }
     }
 
@@ -313,7 +313,7 @@ mod tests {
             .descendants()
             .filter(|node| node.tag_name().name().ends_with("CharacteristicMeasurement"))
             .collect();
-        assert_eq!(measurements.len(), Quantity::ALL.len());
+        assert_eq!(measurements.len(), InspectedQuantity::ALL.len());
         for node in measurements {
             let kind = node.tag_name().name().trim_end_matches("Measurement").to_owned();
             let item = by_id(&refer(node, "CharacteristicItemId"));

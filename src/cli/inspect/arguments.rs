@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::drawing::DrawingFlags;
-use super::source::Source;
+use super::source::InspectionSource;
 use crate::cli::pictures::view_from;
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs, require, require_positive};
@@ -87,7 +87,7 @@ pub(in crate::cli) struct InspectArguments {
 
 impl InspectArguments {
     /// Checks flags and places of outputs before the work begins.
-    pub fn check(&self) -> Result<(), CliError> {
+    pub(super) fn check(&self) -> Result<(), CliError> {
         let outputs = [("--out", ".html", &self.out), ("--csv", ".csv", &self.csv)];
         let inputs = [
             Some(&self.features),
@@ -112,7 +112,7 @@ impl InspectArguments {
     }
 
     /// What they say of the drawing.
-    pub fn drawing_flags(&self) -> DrawingFlags {
+    pub(super) fn drawing_flags(&self) -> DrawingFlags {
         DrawingFlags {
             unit: self.nominal_unit,
             general: self.general,
@@ -122,9 +122,9 @@ impl InspectArguments {
     }
 
     /// Reads what was measured.
-    pub fn source(&self) -> Result<Source, CliError> {
+    pub(super) fn source(&self) -> Result<InspectionSource, CliError> {
         let _reading = WorkProgress::stage("read");
-        Source::read(&self.features, [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()])
+        InspectionSource::read(&self.features, [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()])
     }
 }
 

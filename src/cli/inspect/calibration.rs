@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
 
-use super::source::Source;
+use super::source::InspectionSource;
 use crate::cli::CliError;
 use crate::scene::Scene;
 use crate::stylus::ProbedPoint;
@@ -20,13 +20,16 @@ pub(super) struct CalibrationLine {
 const NOT_STATED: &str = "not stated";
 
 /// The state of the calibration, as far as scene and touches say it.
-pub(super) fn calibration_of(source: &Source) -> Result<Vec<CalibrationLine>, CliError> {
+pub(super) fn calibration_of(source: &InspectionSource) -> Result<Vec<CalibrationLine>, CliError> {
     let scene =
         source.scene.as_deref().map(|path| Ok::<_, CliError>((path, Scene::read_with_text(path)?))).transpose()?;
     let mut lines = of_touches(&source.touches);
     match &scene {
         Some((path, (scene, yaml))) => lines.extend(of_scene(path, scene, yaml)),
-        None => lines.push(line("scene", NOT_STATED, "no scene was given (--scene): when and how tip, force sensor and place of the scan were calibrated is not stated")),
+        None => {
+            let why = "no scene was given (--scene): when tip, force sensor and place of the scan were calibrated is not stated";
+            lines.push(line("scene", NOT_STATED, why));
+        }
     }
     Ok(lines)
 }
@@ -44,7 +47,8 @@ fn of_touches(touches: &[ProbedPoint]) -> Vec<CalibrationLine> {
         all.sort_by(f64::total_cmp);
         all[all.len() / 2] * 1e3
     };
-    let mm = |number: f64| format!("{number:.4} mm");
+    // 0 is that of a file that does not say it
+    let mm = |number: f64| if number > 0.0 { format!("{number:.4} mm") } else { NOT_STATED.to_owned() };
     let median = "median over the touches; date of the calibration not stated";
     vec![
         line("radius of the ball", mm(median_mm(|touch| touch.radius)), "as told when it was measured"),

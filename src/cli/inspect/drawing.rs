@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::source::inspected_file;
 use crate::cli::{CliError, Losses, counted, print_result};
-use crate::conformity::{GeneralTolerance, Quantity, ToleranceLimits};
+use crate::conformity::{GeneralTolerance, InspectedQuantity, ToleranceLimits};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::InspectedFile;
 use crate::io::mesh_file::MeshUnit;
@@ -26,21 +26,21 @@ pub(super) struct DrawingFlags {
 /// One characteristic and its limits.
 pub(super) struct Drawn {
     pub nominal: NominalRecord,
-    pub quantity: Quantity,
+    pub quantity: InspectedQuantity,
     pub limits: ToleranceLimits,
     /// where the limits are from
     pub from: String,
 }
 
 /// All characteristics of a part.
-pub(super) struct Drawing {
+pub(super) struct PartDrawing {
     pub characteristics: Vec<Drawn>,
     pub file: InspectedFile,
     /// what was left out of it, in words
     pub notes: Vec<String>,
 }
 
-impl Drawing {
+impl PartDrawing {
     /// Reads nominal values, or makes them of the features of a CAD mesh.
     pub fn read(path: &Path, flags: &DrawingFlags) -> Result<Self, CliError> {
         if is_nominal_file(path) {
@@ -85,7 +85,7 @@ fn drawn(nominal: NominalRecord, flags: &DrawingFlags) -> Result<Drawn, String> 
 
 fn general_limits(
     record: &NominalRecord,
-    quantity: Quantity,
+    quantity: InspectedQuantity,
     flags: &DrawingFlags,
 ) -> Result<(ToleranceLimits, String), String> {
     let (name, unit, nominal) = (&record.name, quantity.unit(), record.nominal());
@@ -133,10 +133,10 @@ fn of_features(features: &[FeatureRecord], flags: &DrawingFlags) -> Vec<NominalR
         };
         let depth = feature.depth_mm.filter(|_| feature.through != Some(true) && feature.depth_is_at_least.is_none());
         let sizes = [
-            (Quantity::Diameter, feature.diameter_mm),
-            (Quantity::Width, feature.width_mm),
-            (Quantity::Length, feature.length_mm),
-            (Quantity::Depth, depth),
+            (InspectedQuantity::Diameter, feature.diameter_mm),
+            (InspectedQuantity::Width, feature.width_mm),
+            (InspectedQuantity::Length, feature.length_mm),
+            (InspectedQuantity::Depth, depth),
         ];
         for (quantity, size) in sizes {
             let Some(size) = size else { continue };
@@ -145,7 +145,7 @@ fn of_features(features: &[FeatureRecord], flags: &DrawingFlags) -> Vec<NominalR
             records.push(NominalRecord { name, quantity: quantity.name().to_owned(), nominal_mm, ..base.clone() });
         }
         if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") = (flags.position_mm, &**kind) {
-            let (name, quantity) = (format!("{kind} {count} position"), Quantity::Position.name().to_owned());
+            let (name, quantity) = (format!("{kind} {count} position"), InspectedQuantity::Position.name().to_owned());
             records.push(NominalRecord { name, quantity, tolerance_mm: Some(tolerance), ..base });
         }
     }

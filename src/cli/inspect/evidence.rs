@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::conformity::Quantity;
+use crate::conformity::InspectedQuantity;
 use crate::io::features_file::FeatureRecord;
 use crate::io::probed_touches_file::TouchLine;
 use crate::stylus::ProbedPoint;
@@ -31,7 +31,7 @@ pub(super) struct TouchEvidence {
 
 /// How far the touches behind a quantity are off the surface that was fitted to them; `None` where that surface is not in the file.
 pub(super) fn touch_evidence(
-    quantity: Quantity,
+    quantity: InspectedQuantity,
     feature: &FeatureRecord,
     runs: &[[u32; 2]],
     touches: &[ProbedPoint],
@@ -46,7 +46,7 @@ pub(super) fn touch_evidence(
     let seat = |touch: &ProbedPoint| touch.point * 1e3 - centre;
     let order = |at: usize| at as f64;
     let (ideal, along, places): (_, _, Vec<[f64; 2]>) = match (quantity, feature.diameter_mm, feature.width_mm) {
-        (Quantity::Depth, ..) => {
+        (InspectedQuantity::Depth, ..) => {
             let depth = feature.depth_mm?;
             let level = if matches!(&*feature.kind, "boss" | "cylinder") { depth } else { -depth };
             let seats: Vec<_> = all.iter().map(|touch| seat(touch)).collect();
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn a_touch_outside_of_the_fitted_cylinder_is_off_by_its_distance() {
         let touches = [touch(14.01, 20.0, -1.0), touch(10.0, 23.98, -2.0)];
-        let found = touch_evidence(Quantity::Diameter, &hole(), &[[0, 1]], &touches).unwrap();
+        let found = touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 1]], &touches).unwrap();
         let off: Vec<f64> = found.drawn.iter().map(|[_, off]| *off).collect();
         assert!((off[0] - 0.01).abs() < 1e-9 && (off[1] + 0.02).abs() < 1e-9, "{off:?}");
         assert!((found.rms_mm - ((0.01f64.powi(2) + 0.02f64.powi(2)) / 2.0).sqrt()).abs() < 1e-9);
@@ -200,13 +200,13 @@ mod tests {
         let opening = corners.map(|(x, y)| touch(x, y, 0.01 * x));
         let floor = corners.map(|(x, y)| touch(x, y, -5.0 + if x == y { 0.002 } else { -0.002 }));
         let touches: Vec<_> = opening.into_iter().chain(floor).collect();
-        let found = touch_evidence(Quantity::Depth, &hole(), &[[0, 7]], &touches).unwrap();
+        let found = touch_evidence(InspectedQuantity::Depth, &hole(), &[[0, 7]], &touches).unwrap();
         let off: Vec<f64> = found.drawn.iter().map(|[_, off]| (off * 1e6).round() / 1e6 + 0.0).collect();
         assert_eq!(off, [0.0, 0.0, 0.0, 0.0, 0.002, -0.002, -0.002, 0.002]);
     }
 
     #[test]
     fn touches_that_are_not_in_the_file_give_no_plot() {
-        assert!(touch_evidence(Quantity::Diameter, &hole(), &[[0, 5]], &[touch(14.0, 20.0, 0.0)]).is_none());
+        assert!(touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 5]], &[touch(14.0, 20.0, 0.0)]).is_none());
     }
 }

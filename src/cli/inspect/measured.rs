@@ -2,13 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::conformity::{MeasuredNumber, Quantity, coordinate_std, position};
+use crate::conformity::{InspectedQuantity, MeasuredNumber, coordinate_std, position};
 use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
 
 /// What a file says of a characteristic.
 #[derive(Default)]
-pub(super) struct Measurement {
+pub(super) struct CharacteristicMeasurement {
     pub number: Option<MeasuredNumber>,
     /// why there is none
     pub why_none: Option<String>,
@@ -16,7 +16,7 @@ pub(super) struct Measurement {
     pub runs: Vec<[u32; 2]>,
 }
 
-impl Measurement {
+impl CharacteristicMeasurement {
     fn none(why: String) -> Self {
         Self { why_none: Some(why), ..Self::default() }
     }
@@ -28,12 +28,12 @@ pub(super) fn measurement(
     file: &FeatureFile,
     feature: &FeatureRecord,
     kind: Kind,
-    quantity: Quantity,
+    quantity: InspectedQuantity,
     nominal_mm: Option<[f64; 3]>,
     datum: Option<&FeatureRecord>,
-) -> Measurement {
+) -> CharacteristicMeasurement {
     let not_measured = || {
-        Measurement::none(match &*feature.fitted_to {
+        CharacteristicMeasurement::none(match &*feature.fitted_to {
             "mesh" => {
                 format!("{quantity} of feature {} was not measured, which was fitted to the mesh: touch it", feature.id)
             }
@@ -46,33 +46,39 @@ pub(super) fn measurement(
         (value.map(|value| MeasuredNumber { value, std, is_at_least }), runs_of(feature, name))
     };
     let (number, runs) = match quantity {
-        Quantity::Diameter => own(feature.diameter_mm, false),
-        Quantity::Width => own(feature.width_mm, false),
-        Quantity::Length => own(feature.length_mm, false),
-        Quantity::Depth => own(feature.depth_mm, feature.depth_is_at_least == Some(true)),
-        Quantity::ConeAngle => own(feature.cone_angle_deg, false),
-        Quantity::X | Quantity::Y | Quantity::Z => {
-            let axis = [Quantity::X, Quantity::Y, Quantity::Z].iter().position(|one| *one == quantity).unwrap_or(0);
+        InspectedQuantity::Diameter => own(feature.diameter_mm, false),
+        InspectedQuantity::Width => own(feature.width_mm, false),
+        InspectedQuantity::Length => own(feature.length_mm, false),
+        InspectedQuantity::Depth => own(feature.depth_mm, feature.depth_is_at_least == Some(true)),
+        InspectedQuantity::ConeAngle => own(feature.cone_angle_deg, false),
+        InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
+            let axis = [InspectedQuantity::X, InspectedQuantity::Y, InspectedQuantity::Z]
+                .iter()
+                .position(|one| *one == quantity)
+                .unwrap_or(0);
             (coordinate(feature, kind, axis), runs_of(feature, surface(feature)))
         }
-        Quantity::Position => {
+        InspectedQuantity::Position => {
             let number = feature.center_mm.zip(nominal_mm).and_then(|(centre, nominal)| {
                 let std = feature.std.get("center_mm").copied();
                 position(kind, &Point3::from(centre), feature.axis.map(Vector3::from), std, &Point3::from(nominal))
             });
             (number, runs_of(feature, surface(feature)))
         }
-        Quantity::Roundness | Quantity::Cylindricity | Quantity::Straightness | Quantity::Flatness => {
-            (form(feature, quantity), runs_of(feature, surface(feature)))
-        }
+        InspectedQuantity::Roundness
+        | InspectedQuantity::Cylindricity
+        | InspectedQuantity::Straightness
+        | InspectedQuantity::Flatness => (form(feature, quantity), runs_of(feature, surface(feature))),
         _ => {
-            let Some(datum) = datum else { return Measurement::none("its datum was not found".to_owned()) };
+            let Some(datum) = datum else {
+                return CharacteristicMeasurement::none("its datum was not found".to_owned());
+            };
             return related(file, feature, datum, quantity);
         }
     };
     match number {
         None => not_measured(),
-        number => Measurement { number, why_none: None, runs },
+        number => CharacteristicMeasurement { number, why_none: None, runs },
     }
 }
 
@@ -94,40 +100,45 @@ fn coordinate(feature: &FeatureRecord, kind: Kind, axis: usize) -> Option<Measur
     Some(MeasuredNumber { value, std, is_at_least: false })
 }
 
-fn form(feature: &FeatureRecord, quantity: Quantity) -> Option<MeasuredNumber> {
+fn form(feature: &FeatureRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
     let form = feature.form.as_ref()?;
     let value = match quantity {
-        Quantity::Roundness => form.roundness_mm,
-        Quantity::Cylindricity => form.cylindricity_mm,
-        Quantity::Straightness => form.straightness_mm,
+        InspectedQuantity::Roundness => form.roundness_mm,
+        InspectedQuantity::Cylindricity => form.cylindricity_mm,
+        InspectedQuantity::Straightness => form.straightness_mm,
         _ => form.flatness_mm,
     };
     Some(MeasuredNumber { value: value?, std: form.std.get(quantity.name()).copied(), is_at_least: false })
 }
 
 /// A number of a relation by its name.
-pub(super) fn relation_number(relation: &RelationRecord, quantity: Quantity) -> Option<MeasuredNumber> {
+pub(super) fn relation_number(relation: &RelationRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
     let value = match quantity {
-        Quantity::Perpendicularity => relation.perpendicularity_mm,
-        Quantity::Parallelism => relation.parallelism_mm,
-        Quantity::Coaxiality => relation.coaxiality_mm,
-        Quantity::Concentricity => relation.concentricity_mm,
-        Quantity::Distance => relation.distance_mm,
-        Quantity::Angle => relation.angle_deg,
+        InspectedQuantity::Perpendicularity => relation.perpendicularity_mm,
+        InspectedQuantity::Parallelism => relation.parallelism_mm,
+        InspectedQuantity::Coaxiality => relation.coaxiality_mm,
+        InspectedQuantity::Concentricity => relation.concentricity_mm,
+        InspectedQuantity::Distance => relation.distance_mm,
+        InspectedQuantity::Angle => relation.angle_deg,
         _ => None,
     };
     Some(MeasuredNumber { value: value?, std: relation.std.get(quantity.name()).copied(), is_at_least: false })
 }
 
-fn related(file: &FeatureFile, feature: &FeatureRecord, datum: &FeatureRecord, quantity: Quantity) -> Measurement {
+fn related(
+    file: &FeatureFile,
+    feature: &FeatureRecord,
+    datum: &FeatureRecord,
+    quantity: InspectedQuantity,
+) -> CharacteristicMeasurement {
     let find = |of: u32, to: u32| {
         let of_both = file.relations.iter().filter(|relation| relation.of == of && relation.to == to);
         of_both.filter_map(|relation| Some((relation, relation_number(relation, quantity)?))).next()
     };
     // between two axes the distance and the angle are the same from either
     let is_same_from_either = |relation: &RelationRecord| match quantity {
-        Quantity::Angle => true,
-        Quantity::Distance => relation.kind == "distance",
+        InspectedQuantity::Angle => true,
+        InspectedQuantity::Distance => relation.kind == "distance",
         _ => false,
     };
     let (of, to) = (feature.id, datum.id);
@@ -139,16 +150,16 @@ fn related(file: &FeatureFile, feature: &FeatureRecord, datum: &FeatureRecord, q
             let why = format!(
                 "the features have {quantity} of {to} to {of} alone: exchange feature and datum in the drawing"
             );
-            return Measurement::none(why);
+            return CharacteristicMeasurement::none(why);
         }
         (None, None) => {
             let why = format!(
                 "the features have no {quantity} of {of} to {to}: touch both, and see which relations docs/features.md has"
             );
-            return Measurement::none(why);
+            return CharacteristicMeasurement::none(why);
         }
     };
     let mut runs = runs_of(feature, surface(feature));
     runs.extend(runs_of(datum, surface(datum)));
-    Measurement { number: Some(number), why_none: None, runs }
+    CharacteristicMeasurement { number: Some(number), why_none: None, runs }
 }

@@ -12,10 +12,10 @@ mod summary;
 
 pub(super) use self::arguments::InspectArguments;
 use self::calibration::calibration_of;
-use self::drawing::Drawing;
+use self::drawing::PartDrawing;
 use self::page::{ReportInput, page, write_page};
 use self::rows::{Inspected, inspected};
-use self::source::Source;
+use self::source::InspectionSource;
 use super::pictures::view_from;
 use super::progress::WorkProgress;
 use super::{CliError, Losses, not_written, print_report};
@@ -38,7 +38,7 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
     let drawing = {
         let _reading = WorkProgress::stage("read the drawing");
         let nominal = arguments.nominal.as_deref().ok_or_else(|| CliError::usage("--nominal is missing"))?;
-        Drawing::read(nominal, &arguments.drawing_flags())?
+        PartDrawing::read(nominal, &arguments.drawing_flags())?
     };
     let params = DecisionParams { rule: arguments.rule, confidence: arguments.confidence };
     let inspected = inspected(arguments, &source, &drawing, &params)?;
@@ -48,7 +48,7 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
 }
 
 /// Writes the files that were asked for.
-fn write(arguments: &InspectArguments, source: &Source, inspected: &Inspected) -> Result<(), CliError> {
+fn write(arguments: &InspectArguments, source: &InspectionSource, inspected: &Inspected) -> Result<(), CliError> {
     let record = &inspected.record;
     if let Some(path) = &arguments.csv {
         write_inspection_table(path, &record.characteristics).map_err(CliError::not_written)?;

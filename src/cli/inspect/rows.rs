@@ -6,12 +6,13 @@ use chrono::{SecondsFormat, Utc};
 use nalgebra::{Point3, Vector3};
 
 use super::arguments::InspectArguments;
-use super::drawing::{Drawing, Drawn};
-use super::measured::{Measurement, measurement};
-use super::source::Source;
+use super::drawing::{Drawn, PartDrawing};
+use super::measured::{CharacteristicMeasurement, measurement};
+use super::source::InspectionSource;
 use crate::cli::CliError;
 use crate::conformity::{
-    Assessment, Decision, DecisionParams, FeatureMatch, FeaturePlace, Quantity, SoughtFeature, assess, match_features,
+    Assessment, Decision, DecisionParams, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess,
+    match_features,
 };
 use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
@@ -40,14 +41,14 @@ pub(super) struct Inspected {
     /// of each characteristic, the touches behind it: runs of numbers
     pub runs: Vec<Vec<[u32; 2]>>,
     /// of each characteristic
-    pub quantities: Vec<Quantity>,
+    pub quantities: Vec<InspectedQuantity>,
 }
 
 /// Inspects.
 pub(super) fn inspected(
     arguments: &InspectArguments,
-    source: &Source,
-    drawing: &Drawing,
+    source: &InspectionSource,
+    drawing: &PartDrawing,
     params: &DecisionParams,
 ) -> Result<Inspected, CliError> {
     let drawn = &drawing.characteristics;
@@ -93,14 +94,14 @@ fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
     groups
 }
 
-struct Matches {
+struct DrawingMatches {
     /// of each group
     features: Vec<FeatureMatch>,
     /// of each characteristic, where it has a datum
     datums: Vec<Option<FeatureMatch>>,
 }
 
-fn match_all(drawn: &[Drawn], groups: &[Vec<usize>], file: &FeatureFile, reach: f64) -> Matches {
+fn match_all(drawn: &[Drawn], groups: &[Vec<usize>], file: &FeatureFile, reach: f64) -> DrawingMatches {
     let places: Vec<_> = file.features.iter().filter_map(place_of).collect();
     let sought: Vec<_> = groups.iter().map(|group| sought_of(drawn, group)).collect();
     let features = match_features(&sought, &places, reach);
@@ -110,7 +111,7 @@ fn match_all(drawn: &[Drawn], groups: &[Vec<usize>], file: &FeatureFile, reach: 
         let sought = SoughtFeature { kind: datum.kind()?, id: datum.feature, place, size: None };
         match_features(&[sought], &places, reach).pop()
     };
-    Matches { features, datums: drawn.iter().map(datum).collect() }
+    DrawingMatches { features, datums: drawn.iter().map(datum).collect() }
 }
 
 fn point(mm: [f64; 3]) -> Point3<f64> {
@@ -129,7 +130,7 @@ fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
 
 fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {
     let first = &drawn[group[0]].nominal;
-    let is_size = |at: &&usize| matches!(drawn[**at].quantity, Quantity::Diameter | Quantity::Width);
+    let is_size = |at: &&usize| matches!(drawn[**at].quantity, InspectedQuantity::Diameter | InspectedQuantity::Width);
     let size = group.iter().find(is_size).map(|&at| drawn[at].nominal.nominal() * 1e-3);
     SoughtFeature { kind: first.kind().unwrap_or_default(), id: first.feature, place: first.center_mm.map(point), size }
 }
@@ -237,8 +238,8 @@ fn characteristic(
     (record, measured.runs)
 }
 
-fn missing(why: String) -> Measurement {
-    Measurement { why_none: Some(why), ..Measurement::default() }
+fn missing(why: String) -> CharacteristicMeasurement {
+    CharacteristicMeasurement { why_none: Some(why), ..CharacteristicMeasurement::default() }
 }
 
 /// Kinds that a drawing would have a characteristic for.
@@ -246,8 +247,8 @@ const COUNTED: [&str; 6] = ["hole", "slot", "pocket", "boss", "cylinder", "notch
 
 fn record_of(
     arguments: &InspectArguments,
-    source: &Source,
-    drawing: &Drawing,
+    source: &InspectionSource,
+    drawing: &PartDrawing,
     params: &DecisionParams,
     characteristics: Vec<CharacteristicRecord>,
     matched: &BTreeSet<u32>,

@@ -14,7 +14,7 @@ use crate::io::touches_file::read_touches;
 use crate::stylus::ProbedPoint;
 
 /// What was measured, as its files have it.
-pub(super) struct Source {
+pub(super) struct InspectionSource {
     pub features: FeatureFile,
     pub touches: Vec<ProbedPoint>,
     /// of an arm
@@ -28,7 +28,7 @@ pub(super) struct Source {
     pub notes: Vec<String>,
 }
 
-impl Source {
+impl InspectionSource {
     /// - `path`: a file of features, or a folder with one.
     /// - `named`: touches, mesh and scene, where flags name them; else they are looked for beside the features.
     pub fn read(path: &Path, named: [Option<&Path>; 3]) -> Result<Self, CliError> {

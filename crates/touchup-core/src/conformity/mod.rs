@@ -21,4 +21,4 @@ pub use general::GeneralTolerance;
 pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
 pub use place::{coordinate_std, position};
 pub use probability::{Distribution, ToleranceLimits, conformance_probability};
-pub use quantity::Quantity;
+pub use quantity::InspectedQuantity;

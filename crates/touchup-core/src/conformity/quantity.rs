@@ -1,12 +1,13 @@
 //! What is measured of a feature.
 
 use super::probability::Distribution;
+use crate::features::Kind;
 use crate::names;
 
 names! {
     /// A quantity that a drawing has tolerances for, by its name with its unit.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-    pub enum Quantity {
+    pub enum InspectedQuantity {
         /// of a hole, notch, boss or cylinder
         Diameter = "diameter_mm",
         /// of a slot or pocket
@@ -48,7 +49,7 @@ names! {
     }
 }
 
-impl Quantity {
+impl InspectedQuantity {
     /// The one of a name.
     pub fn of(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|quantity| quantity.name() == name)
@@ -87,9 +88,20 @@ impl Quantity {
         self == Self::Position
     }
 
-    /// Whether it is a form.
-    pub fn is_form(self) -> bool {
-        matches!(self, Self::Roundness | Self::Cylindricity | Self::Straightness | Self::Flatness)
+    /// Whether a feature of that kind has it.
+    pub fn is_of(self, kind: Kind) -> bool {
+        let is_round = matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch);
+        let is_slot = matches!(kind, Kind::Slot | Kind::Pocket);
+        match self {
+            Self::Diameter | Self::Roundness | Self::Cylindricity | Self::Straightness => is_round,
+            Self::Width => is_slot,
+            Self::Length => is_slot || matches!(kind, Kind::Edge | Kind::Cylinder),
+            Self::Depth => is_slot || matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder),
+            Self::ConeAngle => kind == Kind::Hole,
+            Self::Flatness => kind == Kind::Plane,
+            Self::Position => !matches!(kind, Kind::Plane | Kind::Corner),
+            _ => true,
+        }
     }
 
     /// Whether a general tolerance for linear dimensions applies.
@@ -120,10 +132,26 @@ mod tests {
 
     #[test]
     fn every_name_ends_in_its_unit_and_is_read_again() {
-        for quantity in Quantity::ALL {
+        for quantity in InspectedQuantity::ALL {
             assert!(matches!(quantity.unit(), "mm" | "deg"), "{quantity}");
-            assert_eq!(Quantity::of(quantity.name()), Some(quantity));
+            assert_eq!(InspectedQuantity::of(quantity.name()), Some(quantity));
         }
-        assert_eq!(Quantity::of("diameter"), None);
+        assert_eq!(InspectedQuantity::of("diameter"), None);
+    }
+
+    #[test]
+    fn every_quantity_is_of_some_kind_and_every_kind_has_a_place() {
+        for quantity in InspectedQuantity::ALL {
+            assert!(Kind::ALL.into_iter().any(|kind| quantity.is_of(kind)), "{quantity}");
+        }
+        for kind in Kind::ALL {
+            assert!(
+                [InspectedQuantity::X, InspectedQuantity::Y, InspectedQuantity::Z]
+                    .into_iter()
+                    .all(|quantity| quantity.is_of(kind)),
+                "{kind}"
+            );
+        }
+        assert!(!InspectedQuantity::Position.is_of(Kind::Plane) && !InspectedQuantity::Width.is_of(Kind::Hole));
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use touchup_core::conformity::{Quantity, ToleranceLimits};
+use touchup_core::conformity::{InspectedQuantity, ToleranceLimits};
 use touchup_core::features::Kind;
 
 /// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh. What is not said is left out.
@@ -75,8 +75,8 @@ pub enum NominalTolerance {
 
 impl NominalRecord {
     /// The quantity, once it was checked.
-    pub fn quantity(&self) -> Option<Quantity> {
-        Quantity::of(&self.quantity)
+    pub fn quantity(&self) -> Option<InspectedQuantity> {
+        InspectedQuantity::of(&self.quantity)
     }
 
     /// The kind of the feature, once it was checked.
@@ -92,7 +92,7 @@ impl NominalRecord {
     /// Its limits, in the unit of the quantity.
     pub fn tolerance(&self) -> NominalTolerance {
         let nominal = self.nominal();
-        let is_zone = self.quantity().is_some_and(Quantity::is_zone);
+        let is_zone = self.quantity().is_some_and(InspectedQuantity::is_zone);
         let lower = self.lower_deviation_mm.or(self.lower_deviation_deg);
         let upper = self.upper_deviation_mm.or(self.upper_deviation_deg);
         match (self.tolerance_mm.or(self.tolerance_deg), lower, upper) {
@@ -127,12 +127,18 @@ impl NominalRecord {
             return Err("it has no name: give one in the column name".to_owned());
         }
         check_kind(name, kind)?;
-        let Some(quantity) = Quantity::of(quantity) else {
+        let Some(quantity) = InspectedQuantity::of(quantity) else {
             return Err(format!(
                 "{name}: there is no quantity {quantity:?}: take one of {}",
-                Quantity::ALL.map(Quantity::name).join(", ")
+                InspectedQuantity::ALL.map(InspectedQuantity::name).join(", ")
             ));
         };
+        if !self.kind().is_some_and(|kind| quantity.is_of(kind)) {
+            let others =
+                InspectedQuantity::ALL.into_iter().filter(|other| self.kind().is_some_and(|kind| other.is_of(kind)));
+            let others = others.map(InspectedQuantity::name).collect::<Vec<_>>().join(", ");
+            return Err(format!("{name}: a {kind} has no {quantity}: take one of {others}"));
+        }
         self.check_units(quantity)?;
         self.check_limits(quantity)?;
         if quantity.needs_place() && self.center_mm.is_none() {
@@ -152,7 +158,7 @@ impl NominalRecord {
         }
     }
 
-    fn check_units(&self, quantity: Quantity) -> Result<(), String> {
+    fn check_units(&self, quantity: InspectedQuantity) -> Result<(), String> {
         let of_mm = [
             ("nominal", self.nominal_mm),
             ("tolerance", self.tolerance_mm),
@@ -181,7 +187,7 @@ impl NominalRecord {
         }
     }
 
-    fn check_limits(&self, quantity: Quantity) -> Result<(), String> {
+    fn check_limits(&self, quantity: InspectedQuantity) -> Result<(), String> {
         let (name, unit) = (&self.name, quantity.unit());
         let nominal = self.nominal_mm.or(self.nominal_deg);
         if !quantity.is_zone() && nominal.is_none() {

@@ -55,6 +55,7 @@ fn each_mistake_in_a_row_is_said_with_its_line_and_what_to_do() {
         ("a,hole,roundness_mm,,,-0.1,0.1,,,", "roundness_mm cannot be below 0"),
         ("a,hole,roundness_mm,1,0.1,,,,,", "the nominal value of roundness_mm is 0"),
         ("a,hole,distance_mm,10,0.1,,,,,", "distance_mm needs a datum"),
+        ("a,hole,width_mm,10,0.1,,,,,", "a: a hole has no width_mm: take one of diameter_mm, depth_mm"),
         (",hole,diameter_mm,8,0.1,,,,,", "name is empty"),
         ("a,hole,diameter_mm,8,0,1,,,,,", "11 values for 10 columns"),
     ];

@@ -3,7 +3,7 @@
 use super::html::{escaped, table as html_table};
 use super::tolerance_bar::tolerance_bar;
 use crate::cli::inspect::rows::Inspected;
-use crate::conformity::Quantity;
+use crate::conformity::InspectedQuantity;
 use crate::io::inspection_file::CharacteristicRecord;
 
 /// How a decision looks.
@@ -53,7 +53,7 @@ pub(super) fn probability(share: f64) -> String {
 
 /// What a quantity is called in words.
 pub(super) fn in_words(quantity: &str) -> String {
-    Quantity::of(quantity).map_or(quantity, |quantity| quantity.parts().0).replace('_', " ")
+    InspectedQuantity::of(quantity).map_or(quantity, |quantity| quantity.parts().0).replace('_', " ")
 }
 
 pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {

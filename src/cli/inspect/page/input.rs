@@ -4,13 +4,13 @@ use nalgebra::Vector3;
 
 use crate::cli::inspect::calibration::CalibrationLine;
 use crate::cli::inspect::rows::Inspected;
-use crate::cli::inspect::source::Source;
+use crate::cli::inspect::source::InspectionSource;
 use crate::io::mesh_file::MeshUnit;
 
 /// … all that was read and decided.
 pub(in crate::cli::inspect) struct ReportInput<'a> {
     pub inspected: &'a Inspected,
-    pub source: &'a Source,
+    pub source: &'a InspectionSource,
     pub calibration: &'a [CalibrationLine],
     /// of the mesh of the picture
     pub mesh_unit: MeshUnit,

@@ -12,12 +12,12 @@ const BOTTOM: f64 = 30.0;
 /// Most curves in one drawing.
 const MOST_CURVES: usize = 24;
 
-struct Axes {
+struct PlotAxes {
     x: [f64; 2],
     y: [f64; 2],
 }
 
-impl Axes {
+impl PlotAxes {
     fn x(&self, x: f64) -> f64 {
         LEFT + (x - self.x[0]) / (self.x[1] - self.x[0]) * (SIZE[0] - LEFT - 6.0)
     }
@@ -90,7 +90,7 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> String {
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [x, _]| [low.min(*x), high.max(*x)]);
     let is_angle = evidence.along.contains('°');
     let x = if is_angle { [-180.0, 180.0] } else { [from, if to > from { to } else { from + 1.0 }] };
-    let axes = Axes { x, y: [-range, range] };
+    let axes = PlotAxes { x, y: [-range, range] };
     let mut svg = axes.begin("touches off the fitted surface");
     let band = (2.0 * evidence.stated_mm * 1e3).min(range);
     let _ = write!(
@@ -129,7 +129,7 @@ pub(super) fn force_plot(touches: &[&TouchLine]) -> Option<String> {
     if !from.is_finite() {
         return None;
     }
-    let axes = Axes { x: [from.min(-0.1), 0.0], y: [least, most] };
+    let axes = PlotAxes { x: [from.min(-0.1), 0.0], y: [least, most] };
     let mut svg = axes.begin("force over travel");
     axes.draw(&mut svg, ["travel from the deepest point, mm", "force, N"], [2, 1]);
     for curve in &curves {

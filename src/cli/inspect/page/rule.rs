@@ -2,7 +2,7 @@
 
 use super::sections::rule_name;
 use crate::cli::inspect::summary::percent;
-use crate::conformity::{DecisionRule, Quantity};
+use crate::conformity::{DecisionRule, InspectedQuantity};
 use crate::io::inspection_file::InspectionRecord;
 use touchup_core::numeric::normal_quantile;
 
@@ -24,11 +24,11 @@ pub(super) fn rule(record: &InspectionRecord) -> String {
              (JCGM 106:2012, 8.3).</p>"
         )
     };
-    let is_there = |is_of: fn(Quantity) -> bool| {
-        record.characteristics.iter().any(|one| Quantity::of(&one.quantity).is_some_and(is_of))
+    let is_there = |is_of: fn(InspectedQuantity) -> bool| {
+        record.characteristics.iter().any(|one| InspectedQuantity::of(&one.quantity).is_some_and(is_of))
     };
     let mut more = String::new();
-    if is_there(Quantity::is_zone) {
+    if is_there(InspectedQuantity::is_zone) {
         more += "<p>A width of a zone cannot be below 0: its distribution is the normal one without what is below 0. Of a position the place of the centre is \
                  distributed round and normal about the measured one, and p<sub>c</sub> is what of that is in the zone.</p>\n";
     }

@@ -6,7 +6,7 @@ use super::input::ReportInput;
 use crate::cli::inspect::calibration::CalibrationLine;
 use crate::cli::inspect::measured::relation_number;
 use crate::cli::inspect::summary::first_few;
-use crate::conformity::{Decision, MeasuredNumber, Quantity};
+use crate::conformity::{Decision, InspectedQuantity, MeasuredNumber};
 use crate::io::inspection_file::InspectionRecord;
 
 const NOT_STATED: &str = "not stated";
@@ -83,7 +83,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     for one in &input.inspected.balloons {
         let feature = one.feature.and_then(|id| file.features.iter().find(|feature| feature.id == id));
         let Some(form) = feature.and_then(|feature| feature.form.as_ref()) else { continue };
-        let number = |quantity: Quantity, value: Option<f64>| {
+        let number = |quantity: InspectedQuantity, value: Option<f64>| {
             let number = value.map(|value| MeasuredNumber {
                 value,
                 std: form.std.get(quantity.name()).copied(),
@@ -93,10 +93,10 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
         };
         forms.push(vec![
             format!("{} · {}", one.number, escaped(&one.kind)),
-            number(Quantity::Roundness, form.roundness_mm),
-            number(Quantity::Cylindricity, form.cylindricity_mm),
-            number(Quantity::Straightness, form.straightness_mm),
-            number(Quantity::Flatness, form.flatness_mm),
+            number(InspectedQuantity::Roundness, form.roundness_mm),
+            number(InspectedQuantity::Cylindricity, form.cylindricity_mm),
+            number(InspectedQuantity::Straightness, form.straightness_mm),
+            number(InspectedQuantity::Flatness, form.flatness_mm),
             format!("{:.0} %", form.coverage * 100.0),
         ]);
     }
@@ -105,7 +105,7 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
         let kind = feature.map_or(String::new(), |feature| escaped(&feature.kind));
         balloon(id).map_or_else(|| format!("{kind}, id {id}"), |balloon| format!("{} · {kind}", balloon.number))
     };
-    let quantities = Quantity::ALL.into_iter().filter(|quantity| quantity.needs_datum());
+    let quantities = InspectedQuantity::ALL.into_iter().filter(|quantity| quantity.needs_datum());
     let of_balloons = file.relations.iter().filter(|relation| balloon(relation.of).is_some());
     let all: Vec<_> = of_balloons
         .map(|relation| {
