@@ -273,7 +273,7 @@ fn features_of_a_cad_mesh_are_nominal_values() {
     assert_eq!(record["without_characteristic"], json!([3]));
 }
 
-/// A flag whose hole was measured by the second to the fourth of its touches.
+/// A flag whose hole was measured by the second to the fourth of its touches, which are numbered from 1 on.
 #[test]
 fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {
     let part = Part::new();
@@ -292,7 +292,7 @@ fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {
     let mut features: Value = serde_json::from_slice(&fs::read(part.path("features.json")).unwrap()).unwrap();
     let mut hole = features["features"][0].take();
     hole["diameter_mm"] = json!(8.0);
-    hole["touches"] = json!({ "diameter_mm": [[1, 3]] });
+    hole["touches"] = json!({ "diameter_mm": [[2, 4]] });
     part.write("probed.json", &json!({ "features": [{ "flag": 7, "feature": hole }, { "flag": 8 }] }).to_string());
     part.write("n.csv", &format!("{HEADER}\n{BORE}\n"));
     let output = Command::new(env!("CARGO_BIN_EXE_touchup"))

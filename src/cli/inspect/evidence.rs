@@ -12,6 +12,9 @@ use crate::stylus::ProbedPoint;
 /// Most touches that a plot draws: evenly chosen of more.
 const MOST_DRAWN: usize = 300;
 
+/// Cosine of 45°: a normal nearer to the axis is that of a floor, another one that of a wall.
+const HALF_WAY: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Touches on a surface.
 pub(super) struct TouchEvidence {
     /// what the distances are from
@@ -39,7 +42,10 @@ pub(super) fn touch_evidence(
     let centre = Point3::from(feature.center_mm?);
     let axis = Vector3::from(feature.axis?);
     let numbers = runs.iter().flat_map(|[first, last]| *first..=*last);
-    let all: Vec<&ProbedPoint> = numbers.map(|number| touches.get(number as usize)).collect::<Option<_>>()?;
+    let mut all: Vec<&ProbedPoint> = numbers.map(|number| touches.get(number as usize)).collect::<Option<_>>()?;
+    // of the touches behind a number those on its own surface: walls lie along the axis, floors and planes across it
+    let is_flat = quantity == InspectedQuantity::Depth || feature.kind == "plane";
+    all.retain(|touch| (touch.normal.dot(&axis).abs() > HALF_WAY) == is_flat);
     if all.is_empty() {
         return None;
     }
@@ -161,6 +167,10 @@ mod tests {
     use super::*;
 
     fn touch(x_mm: f64, y_mm: f64, z_mm: f64) -> ProbedPoint {
+        touch_on(x_mm, y_mm, z_mm, Vector3::z())
+    }
+
+    fn touch_on(x_mm: f64, y_mm: f64, z_mm: f64, normal: Vector3<f64>) -> ProbedPoint {
         let point = Point3::new(x_mm, y_mm, z_mm) * 1e-3;
         ProbedPoint {
             stamp_ns: 0,
@@ -168,7 +178,7 @@ mod tests {
             centre: point,
             radius: 0.0,
             point,
-            normal: Vector3::z(),
+            normal,
             sigma: 10e-6,
             calibration: 0.0,
             place: 0.0,
@@ -184,8 +194,10 @@ mod tests {
 
     #[test]
     fn a_touch_outside_of_the_fitted_cylinder_is_off_by_its_distance() {
-        let touches = [touch(14.01, 20.0, -1.0), touch(10.0, 23.98, -2.0)];
-        let found = touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 1]], &touches).unwrap();
+        let walls = [touch_on(14.01, 20.0, -1.0, -Vector3::x()), touch_on(10.0, 23.98, -2.0, -Vector3::y())];
+        let touches = [walls[0], walls[1], touch(18.0, 20.0, 0.0)];
+        let found = touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 2]], &touches).unwrap();
+        assert_eq!(found.count, 2, "the one on the plane beside the hole is no touch of its wall");
         let off: Vec<f64> = found.drawn.iter().map(|[_, off]| *off).collect();
         assert!((off[0] - 0.01).abs() < 1e-9 && (off[1] + 0.02).abs() < 1e-9, "{off:?}");
         assert!((found.rms_mm - ((0.01f64.powi(2) + 0.02f64.powi(2)) / 2.0).sqrt()).abs() < 1e-9);

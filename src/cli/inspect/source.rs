@@ -133,10 +133,11 @@ fn point_of(touch: &TouchLine) -> ProbedPoint {
     }
 }
 
-/// A feature by another number, and its touches counted from `offset` on.
+/// A feature by another number, and its touches counted from `offset` on: those of a flag are numbered from 1 on.
 fn renumbered(mut feature: FeatureRecord, id: u32, offset: u32) -> FeatureRecord {
     feature.id = id;
-    feature.touches.values_mut().flatten().flatten().for_each(|number| *number += offset);
+    let of_all = |number: &mut u32| *number = (*number + offset).saturating_sub(1);
+    feature.touches.values_mut().flatten().flatten().for_each(of_all);
     feature
 }
 

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{NominalFileError, NominalRecord};
+use super::error::NominalFileError;
+use super::record::NominalRecord;
 use crate::file_error::{FileError, read_file, write_file};
 
 #[derive(Serialize, Deserialize)]

@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{DatumRecord, NominalFileError, NominalRecord};
+use super::error::NominalFileError;
+use super::record::{DatumRecord, NominalRecord};
 use crate::csv_line::csv_line;
 use crate::file_error::{FileError, write_file};
 use crate::table::{Row, TableError, read_table};
