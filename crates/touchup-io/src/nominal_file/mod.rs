@@ -56,7 +56,8 @@ pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError>
 /// [`FileError::Write`].
 pub fn write_nominal(path: &Path, records: &[NominalRecord], comment: &[&str]) -> Result<(), NominalFileError> {
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    Ok(if is_json { json::write(path, records)? } else { rows::write(path, records, comment)? })
+    let written = if is_json { json::write(path, records) } else { rows::write(path, records, comment) };
+    Ok(written?)
 }
 
 #[cfg(test)]
