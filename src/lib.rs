@@ -8,7 +8,7 @@
 //!
 //! | crate | modules |
 //! |---|---|
-//! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`align`] [`compare`] [`calibrate`] [`diagnose`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
+//! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`conformity`] [`align`] [`compare`] [`calibrate`] [`diagnose`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`live`], [`session`] |
@@ -22,7 +22,7 @@
 struct MethodPage;
 
 pub use touchup_core::{
-    align, calibrate, compare, diagnose, features, form, haptic, mesh, probing, reconstruct, stylus,
+    align, calibrate, compare, conformity, diagnose, features, form, haptic, mesh, probing, reconstruct, stylus,
 };
 pub use touchup_session::{clock, live, replay, scan, scene, session, threads};
 pub use {touchup_io as io, touchup_sim as sim};

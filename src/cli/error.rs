@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
+use crate::io::nominal_file::NominalFileError;
 use crate::io::touches_file::TouchesFileError;
 use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
 use crate::probing::plan::ExploreError;
@@ -87,6 +88,11 @@ impl CliError {
     /// What is wrong in a file of a calibration.
     pub fn calibration(path: &Path, error: impl Display) -> Self {
         Self::new(("calibration", 3), format!("{}: {error}", path.display()), None)
+    }
+
+    /// A file that an inspection rests on and that cannot be read.
+    pub fn inspected(path: &Path, error: io::Error) -> Self {
+        Self::new(("inspection", 3), format!("{}: {error}", path.display()), Some(&error))
     }
 
     /// What an arm, or its work, came to.
@@ -190,6 +196,10 @@ errors_of_rooms! {
     crate::session::SessionError => |_| ("session", 3), "";
     TouchesFileError => of_touches, "";
     FeaturesFileError => of_features, "";
+    NominalFileError => |error| match error {
+        NominalFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
+        _ => ("nominal", 3),
+    }, "";
     OutcomeError => |error| match error {
         OutcomeError::WriteMesh(_) => NOT_WRITTEN,
         OutcomeError::ReadMesh(_) | OutcomeError::Mesh(_) => ("mesh", 3),

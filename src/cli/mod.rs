@@ -17,6 +17,7 @@ mod error;
 mod features;
 mod found;
 mod init;
+mod inspect;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
 mod offsets;
@@ -107,6 +108,8 @@ enum Verb {
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
     Features(features::FeaturesArguments),
+    /// Inspects measured features against a drawing: pass, fail or undecided, and a report that prints
+    Inspect(inspect::InspectArguments),
     /// Probes flagged features with an arm
     #[command(after_help = ARM_SIGNALS)]
     Probe(probe::ProbeArguments),
@@ -174,6 +177,7 @@ impl Verb {
             Self::Init(arguments) => init::init(arguments),
             Self::Refine(arguments) => refine::refine(arguments),
             Self::Features(arguments) => features::features(arguments),
+            Self::Inspect(arguments) => inspect::inspect(arguments),
             Self::Probe(arguments) => probe::probe(arguments),
             Self::Check(arguments) => check::check(arguments),
             Self::Recover(arguments) => recover::recover(arguments),

@@ -25,11 +25,12 @@ const MAY_USE: &[(&str, &str)] = &[
     ("sim", "numeric stylus mesh calibrate diagnose arm"),
     ("form", "numeric"),
     ("features", "numeric stylus mesh form"),
+    ("conformity", "numeric features"),
     ("align", "numeric mesh features"),
     ("compare", "numeric stylus mesh align features"),
     ("calibrate", "numeric stylus mesh align"),
     ("diagnose", "numeric stylus mesh"),
-    ("io", "parameters stylus mesh form features align arm execute"),
+    ("io", "parameters stylus mesh form features conformity align arm execute"),
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
@@ -47,8 +48,8 @@ const MAY_USE: &[(&str, &str)] = &[
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
-        "clock numeric stylus mesh reconstruct haptic live features plan arm execute sim align calibrate compare \
-         diagnose io threads scan scene session replay ros ros2_control ur",
+        "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
+         calibrate compare diagnose io threads scan scene session replay ros ros2_control ur",
     ),
 ];
 

@@ -25,6 +25,7 @@ mod diagnose;
 mod features;
 mod form;
 mod haptic;
+mod inspect;
 mod io;
 mod layers;
 mod light_touch;

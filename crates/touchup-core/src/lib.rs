@@ -13,6 +13,7 @@
 //! | [`haptic`] | [`haptic::Refiner::push`]: face dynamics, region, guard; one sample moves the mesh |
 //! | [`form`] | roundness, flatness, parallelism, position, … of points and of fitted features, with their uncertainty |
 //! | [`features`] | holes, slots, planes, … of a mesh and its touches, with their uncertainty |
+//! | [`conformity`] | whether measured characteristics conform with their tolerances: guard bands, conformance probability, matching |
 //! | [`align`] | rigid registration: of pairs, of features, of surfaces |
 //! | [`compare`] | deviation from the true part, discrepancy of scan and touch, as numbers and as a picture |
 //! | [`calibrate`] | payload and tip calibration, registration of the scan |
@@ -39,6 +40,7 @@
 pub mod align;
 pub mod calibrate;
 pub mod compare;
+pub mod conformity;
 pub mod diagnose;
 pub mod features;
 pub mod form;

@@ -39,14 +39,18 @@ macro_rules! reported {
 }
 
 pub mod atomic;
+mod csv_line;
 pub mod features_file;
 pub mod file_error;
+pub mod inspection_file;
 pub mod machine;
 pub mod mesh_file;
+pub mod nominal_file;
 pub mod pairs_file;
 pub mod parameters_file;
 pub mod png;
 pub mod probed_touches_file;
+pub mod qif_file;
 pub mod recording;
 mod scalar;
 pub mod session_folder;

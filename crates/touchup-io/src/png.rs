@@ -1,6 +1,6 @@
 //! Pictures as PNG files.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 
 use super::atomic::write_atomically;
@@ -13,14 +13,26 @@ use super::atomic::write_atomically;
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says; whatever the disk reports.
 pub fn write_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
-    write_atomically(path, |out| {
-        let mut encoder = png::Encoder::new(out, size[0], size[1]);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header().map_err(io_error)?;
-        writer.write_image_data(pixels).map_err(io_error)?;
-        writer.finish().map_err(io_error)
-    })
+    write_atomically(path, |out| encode(out, size, pixels))
+}
+
+/// The bytes of such a file, as a page holds them.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says.
+pub fn png_bytes(size: [u32; 2], pixels: &[u8]) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, size, pixels)?;
+    Ok(bytes)
+}
+
+fn encode(out: impl Write, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
+    let mut encoder = png::Encoder::new(out, size[0], size[1]);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let mut writer = encoder.write_header().map_err(io_error)?;
+    writer.write_image_data(pixels).map_err(io_error)?;
+    writer.finish().map_err(io_error)
 }
 
 fn io_error(error: png::EncodingError) -> io::Error {

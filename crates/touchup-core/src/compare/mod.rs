@@ -25,7 +25,7 @@ pub use disagreement::{
 };
 pub use lines::DrawnMesh;
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
-pub use picture::{Picture, PictureLabel, PicturePanel, PictureParams, draw_picture};
+pub use picture::{PartView, Picture, PictureLabel, PicturePanel, PictureParams, draw_part, draw_picture};
 pub use sampling::{SampledPoint, sample_surface, surface_area};
 pub use summary::{Histogram, Summary};
 pub use touched::TouchedRegion;

@@ -5,7 +5,7 @@ mod camera;
 mod canvas;
 mod raster;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 use super::colour::{ColourScale, Rgb, colour_of_class};
 use super::disagreement::Class;
@@ -113,6 +113,27 @@ pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> 
     }
     draw_length(&mut picture, bar, &frame);
     picture
+}
+
+/// A picture of a mesh with nothing around it, and where places come to lie in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartView {
+    /// the mesh, with air around it
+    pub picture: Picture,
+    /// of each place, pixels to the right and downwards
+    pub places: Vec<[f64; 2]>,
+}
+
+/// Draws a mesh alone, so that what is written around it can be drawn by somebody else.
+///
+/// - `places`: m, in the frame of the mesh.
+pub fn draw_part(panel: &PicturePanel<'_>, params: &PictureParams<'_>, places: &[Point3<f64>]) -> PartView {
+    let panels = [*panel];
+    let camera = camera_for(&panels, params);
+    let frame = frame_for(&panels, &camera, params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32);
+    let colours = ColourScale { range: params.range, tolerance: params.tolerance };
+    let picture = draw(panel, &camera, &frame, &colours);
+    PartView { picture, places: places.iter().map(|place| frame.pixel(&camera.project(place).xy())).collect() }
 }
 
 fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera {

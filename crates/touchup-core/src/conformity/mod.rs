@@ -1,0 +1,24 @@
+//! Conformity of measured characteristics with the tolerances of a drawing.
+//!
+//! A measured value y with standard uncertainty u says of the measurand, where nothing else is known of it, that it is distributed about
+//! y with the standard deviation u [JCGM 106:2012, 6]. Its conformance probability is the share of that distribution between the
+//! tolerance limits,
+//!
+//! p_c = Φ((T_U − y) / u) − Φ((T_L − y) / u)   [JCGM 106:2012, 7.3 and 7.4]
+//!
+//! and the decision is for acceptance where p_c is large enough ([`assess`]): the tolerance zone without a guard band at either limit
+//! [ISO 14253-1:2017]. Numbers of one characteristic are in one unit, whichever that is.
+
+mod assess;
+mod general;
+mod matching;
+mod place;
+mod probability;
+mod quantity;
+
+pub use assess::{Assessment, Decision, DecisionParams, DecisionRule, MeasuredNumber, OpenReason, assess};
+pub use general::GeneralTolerance;
+pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
+pub use place::{coordinate_std, position};
+pub use probability::{Distribution, ToleranceLimits, conformance_probability};
+pub use quantity::InspectedQuantity;

@@ -1,0 +1,75 @@
+//! Where a feature is, as a drawing states it: coordinates of its centre and its position.
+
+use nalgebra::{Point3, Vector3};
+
+use super::assess::MeasuredNumber;
+use crate::features::Kind;
+
+/// Cosine of 5°: within that a direction counts as along or square to an axis, as in relations of features.
+const ALONG: f64 = 0.996_194_698_091_745_5;
+/// Sine of 5°.
+const SQUARE: f64 = 0.087_155_742_747_658_17;
+
+/// Standard uncertainty of the coordinate of a centre along a direction.
+///
+/// The uncertainty of a centre is the root mean square distance across the axis, which two coordinates share; of a plane that along its
+/// normal; of a corner the distance in space, which three share.
+///
+/// - `std`: of the centre.
+/// - `direction`: unit vector.
+/// - returns: `None` where the uncertainty of the centre says nothing of that direction.
+pub fn coordinate_std(kind: Kind, axis: Option<Vector3<f64>>, std: f64, direction: &Vector3<f64>) -> Option<f64> {
+    let along = axis.map(|axis| axis.dot(direction).abs());
+    match (kind, along) {
+        (Kind::Corner, _) => Some(std / 3f64.sqrt()),
+        (Kind::Plane, Some(along)) => (along >= ALONG).then_some(std),
+        (_, Some(along)) => (along <= SQUARE).then_some(std / 2f64.sqrt()),
+        (_, None) => None,
+    }
+}
+
+/// Position of a centre: twice its distance from the nominal one across the axis [ISO 1101:2017, cylindrical zone]; of a plane along its
+/// normal, of a corner in space. Its standard uncertainty is twice that of one coordinate.
+///
+/// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
+/// - returns: `None` where there is no axis to measure across.
+pub fn position(
+    kind: Kind,
+    centre: &Point3<f64>,
+    axis: Option<Vector3<f64>>,
+    std: Option<f64>,
+    nominal: &Point3<f64>,
+) -> Option<MeasuredNumber> {
+    let off = centre - nominal;
+    if matches!(kind, Kind::Plane | Kind::Corner) {
+        return None;
+    }
+    let distance = off.cross(&axis?).norm();
+    let std = std.map(|std| 2.0 * std / 2f64.sqrt());
+    Some(MeasuredNumber { value: 2.0 * distance, std, is_at_least: false })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_coordinates_share_what_is_known_of_an_axis() {
+        let z = Some(Vector3::z());
+        assert_eq!(coordinate_std(Kind::Hole, z, 0.02, &Vector3::x()), Some(0.02 / 2f64.sqrt()));
+        assert_eq!(coordinate_std(Kind::Hole, z, 0.02, &Vector3::z()), None, "along the axis nothing is known");
+        assert_eq!(coordinate_std(Kind::Plane, z, 0.02, &Vector3::z()), Some(0.02));
+        assert_eq!(coordinate_std(Kind::Plane, z, 0.02, &Vector3::x()), None);
+        assert_eq!(coordinate_std(Kind::Corner, None, 0.03, &Vector3::x()), Some(0.03 / 3f64.sqrt()));
+    }
+
+    /// 3-4-5 across the axis; along the axis nothing counts.
+    #[test]
+    fn position_is_twice_the_distance_across_the_axis() {
+        let (centre, nominal) = (Point3::new(13.0, 24.0, 7.0), Point3::new(10.0, 20.0, 0.0));
+        let found = position(Kind::Hole, &centre, Some(Vector3::z()), Some(0.1), &nominal).unwrap();
+        assert_eq!(found.value, 10.0);
+        assert!((found.std.unwrap() - 0.2 / 2f64.sqrt()).abs() < 1e-15);
+        assert_eq!(position(Kind::Hole, &centre, None, Some(0.1), &nominal), None);
+    }
+}

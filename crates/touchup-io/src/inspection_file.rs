@@ -1,0 +1,220 @@
+//! Results of an inspection: JSON, and its characteristics as a table. Lengths in mm, angles in degrees.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::csv_line::csv_line;
+use super::file_error::{FileError, write_file};
+
+/// A whole inspection.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct InspectionRecord {
+    /// name or number of the part, where it was told
+    pub part: Option<String>,
+    /// of this one part
+    pub serial: Option<String>,
+    /// who inspected
+    pub operator: Option<String>,
+    /// day and time, UTC, RFC 3339
+    pub date: String,
+    /// version of the program
+    pub program: String,
+    /// `iso14253` or `simple`
+    pub rule: String,
+    /// probability that the rule asks for
+    pub confidence: f64,
+    /// k of the expanded uncertainties
+    pub coverage_factor: f64,
+    /// of the whole: `fail` where one characteristic fails, else `undecided` where one is, else `pass`
+    pub verdict: String,
+    /// by decision
+    pub counts: BTreeMap<String, usize>,
+    /// what it rests on
+    pub files: Vec<InspectedFile>,
+    /// in the order of the drawing
+    pub characteristics: Vec<CharacteristicRecord>,
+    /// measured holes, slots, pockets, bosses, cylinders and notches that no characteristic is about, by `id`
+    pub without_characteristic: Vec<u32>,
+    /// what else has to be known, a sentence each
+    pub notes: Vec<String>,
+}
+
+/// A file that an inspection rests on.
+#[derive(Clone, Debug, Serialize)]
+pub struct InspectedFile {
+    /// what it is
+    pub role: String,
+    /// as it was named
+    pub path: String,
+    /// its length
+    pub bytes: u64,
+    /// its checksum, eight hexadecimal digits
+    pub crc32: String,
+}
+
+/// One characteristic.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct CharacteristicRecord {
+    /// number of the balloon in the picture, and of the characteristic there: `2.1`
+    pub number: String,
+    /// of the drawing
+    pub name: String,
+    /// kind of the feature
+    pub kind: String,
+    /// `id` of the feature; left out where none was found
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature: Option<u32>,
+    /// `id` of the datum
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub datum: Option<u32>,
+    /// what of it, with its unit
+    pub quantity: String,
+    /// numbers by name and unit, those of [`NUMBERS`]; what is not known is left out
+    #[serde(flatten)]
+    pub numbers: BTreeMap<String, f64>,
+    /// whether the actual value is a lower bound
+    pub is_at_least: bool,
+    /// where the tolerance is from: `drawing`, `iso2768-m`, …
+    pub tolerance_from: String,
+    /// `pass`, `undecided` or `fail`
+    pub decision: String,
+    /// why nothing was decided, and what to do
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// that it conforms
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conformance_probability: Option<f64>,
+    /// that the decision is wrong; of undecided ones left out
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub risk: Option<f64>,
+    /// how many touches are behind it
+    pub touches: usize,
+    /// `touches` or `mesh`
+    pub fitted_to: String,
+}
+
+/// Names of the numbers of a characteristic, each with `_mm` or `_deg` behind it.
+pub const NUMBERS: [&str; 11] = [
+    "nominal",
+    "lower_limit",
+    "upper_limit",
+    "actual",
+    "deviation",
+    "standard_uncertainty",
+    "expanded_uncertainty",
+    "acceptance_lower",
+    "acceptance_upper",
+    "rejection_lower",
+    "rejection_upper",
+];
+
+impl CharacteristicRecord {
+    /// `mm` or `deg`.
+    pub fn unit(&self) -> &str {
+        self.quantity.rsplit_once('_').map_or("", |(_, unit)| unit)
+    }
+
+    /// A number by its name without the unit.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.numbers.get(&format!("{name}_{}", self.unit())).copied()
+    }
+
+    /// Puts a number down.
+    pub fn set(&mut self, name: &str, number: Option<f64>) {
+        debug_assert!(NUMBERS.contains(&name), "{name}");
+        if let Some(number) = number {
+            self.numbers.insert(format!("{name}_{}", self.unit()), number);
+        }
+    }
+
+    fn fields(&self, units: &[&str]) -> Vec<String> {
+        let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
+        let id = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
+        let mut fields = vec![
+            self.number.clone(),
+            self.name.clone(),
+            self.kind.clone(),
+            id(self.feature),
+            id(self.datum),
+            self.quantity.clone(),
+        ];
+        let numbers = units.iter().flat_map(|unit| NUMBERS.map(|name| self.numbers.get(&format!("{name}_{unit}"))));
+        fields.extend(numbers.map(|number| text(number.copied())));
+        fields.extend([
+            u8::from(self.is_at_least).to_string(),
+            self.tolerance_from.clone(),
+            self.decision.clone(),
+            text(self.conformance_probability),
+            text(self.risk),
+            self.touches.to_string(),
+            self.fitted_to.clone(),
+            self.reason.clone().unwrap_or_default(),
+        ]);
+        fields
+    }
+}
+
+const BEFORE: [&str; 6] = ["number", "name", "kind", "feature", "datum", "quantity"];
+const BEHIND: [&str; 8] =
+    ["is_at_least", "tolerance_from", "decision", "conformance_probability", "risk", "touches", "fitted_to", "reason"];
+
+/// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where there is an angle.
+///
+/// # Errors
+/// [`FileError::Write`].
+pub fn write_inspection_table(path: &Path, characteristics: &[CharacteristicRecord]) -> Result<(), FileError> {
+    let units: Vec<_> = ["mm", "deg"]
+        .into_iter()
+        .filter(|unit| *unit == "mm" || characteristics.iter().any(|one| one.unit() == *unit))
+        .collect();
+    let numbers = units.iter().flat_map(|unit| NUMBERS.map(|name| format!("{name}_{unit}")));
+    let header: Vec<String> =
+        BEFORE.map(str::to_owned).into_iter().chain(numbers).chain(BEHIND.map(str::to_owned)).collect();
+    write_file(path, |out| {
+        writeln!(out, "{}", csv_line(header.iter().map(String::as_str)))?;
+        characteristics
+            .iter()
+            .try_for_each(|one| writeln!(out, "{}", csv_line(one.fields(&units).iter().map(String::as_str))))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(name: &str, quantity: &str) -> CharacteristicRecord {
+        let mut record = CharacteristicRecord {
+            name: name.to_owned(),
+            quantity: quantity.to_owned(),
+            ..CharacteristicRecord::default()
+        };
+        record.set("nominal", Some(8.0));
+        record.set("actual", None);
+        record
+    }
+
+    #[test]
+    fn units_stand_in_the_names_of_numbers() {
+        let json = serde_json::to_value(record("a", "cone_angle_deg")).unwrap();
+        assert_eq!((json["nominal_deg"].as_f64(), json.get("nominal_mm")), (Some(8.0), None));
+        assert!(json.get("actual_deg").is_none() && json.get("risk").is_none());
+    }
+
+    #[test]
+    fn a_table_has_degrees_only_with_an_angle_and_one_width_in_all_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let lines = |characteristics: &[CharacteristicRecord]| {
+            write_inspection_table(&path, characteristics).unwrap();
+            std::fs::read_to_string(&path).unwrap()
+        };
+        let lengths = lines(&[record("a", "diameter_mm"), record("b", "depth_mm")]);
+        assert!(!lengths.contains("_deg"), "{lengths}");
+        let both = lines(&[record("a", "diameter_mm"), record("b", "angle_deg")]);
+        let widths: Vec<_> = both.lines().map(|line| line.split(',').count()).collect();
+        assert_eq!(widths, [BEFORE.len() + 2 * NUMBERS.len() + BEHIND.len(); 3], "{both}");
+    }
+}

@@ -1,0 +1,237 @@
+//! One characteristic of a drawing.
+
+use serde::{Deserialize, Serialize};
+
+use touchup_core::conformity::{InspectedQuantity, ToleranceLimits};
+use touchup_core::features::Kind;
+
+/// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh. What is not said is left out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NominalRecord {
+    /// as the report has it; no two alike
+    pub name: String,
+    /// of the feature: `hole`, `slot`, `pocket`, `boss`, `edge`, `corner`, `plane`, `cylinder`, `notch`
+    pub kind: String,
+    /// what of it, with its unit: `diameter_mm`, …
+    pub quantity: String,
+    /// nominal value of a length; 0 of a zone
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nominal_mm: Option<f64>,
+    /// nominal value of an angle
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nominal_deg: Option<f64>,
+    /// tolerance ± about the nominal value; of a zone its width or diameter. Of an angle in degrees
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance_mm: Option<f64>,
+    /// … of an angle
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance_deg: Option<f64>,
+    /// lower limit deviation from the nominal value, mostly negative, in place of a tolerance ±; without the upper one a single limit
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_deviation_mm: Option<f64>,
+    /// upper limit deviation
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper_deviation_mm: Option<f64>,
+    /// … of an angle
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower_deviation_deg: Option<f64>,
+    /// … of an angle
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper_deviation_deg: Option<f64>,
+    /// nominal centre of the feature, by which it is found
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_mm: Option<[f64; 3]>,
+    /// its `id` in the file of features, in place of the centre
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feature: Option<u32>,
+    /// the feature that it relates to
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub datum: Option<DatumRecord>,
+}
+
+/// The datum of a relation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DatumRecord {
+    /// of the feature
+    pub kind: String,
+    /// its nominal centre
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub center_mm: Option<[f64; 3]>,
+    /// its `id`, in place of the centre
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feature: Option<u32>,
+}
+
+/// What a file says of the tolerance of a characteristic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NominalTolerance {
+    /// limits of the characteristic itself, mm or degrees
+    Limits(ToleranceLimits),
+    /// none: a general tolerance has to apply
+    General,
+}
+
+impl NominalRecord {
+    /// The quantity, once it was checked.
+    pub fn quantity(&self) -> Option<InspectedQuantity> {
+        InspectedQuantity::of(&self.quantity)
+    }
+
+    /// The kind of the feature, once it was checked.
+    pub fn kind(&self) -> Option<Kind> {
+        kind_of(&self.kind)
+    }
+
+    /// Nominal value, mm or degrees; 0 of a zone.
+    pub fn nominal(&self) -> f64 {
+        self.nominal_mm.or(self.nominal_deg).unwrap_or(0.0)
+    }
+
+    /// Its limits, in the unit of the quantity.
+    pub fn tolerance(&self) -> NominalTolerance {
+        let nominal = self.nominal();
+        let is_zone = self.quantity().is_some_and(InspectedQuantity::is_zone);
+        let lower = self.lower_deviation_mm.or(self.lower_deviation_deg);
+        let upper = self.upper_deviation_mm.or(self.upper_deviation_deg);
+        match (self.tolerance_mm.or(self.tolerance_deg), lower, upper) {
+            (Some(width), ..) if is_zone => {
+                NominalTolerance::Limits(ToleranceLimits { lower: None, upper: Some(width) })
+            }
+            (Some(half), ..) => {
+                NominalTolerance::Limits(ToleranceLimits { lower: Some(nominal - half), upper: Some(nominal + half) })
+            }
+            (None, None, None) => NominalTolerance::General,
+            (None, lower, upper) => NominalTolerance::Limits(ToleranceLimits {
+                lower: lower.map(|deviation| nominal + deviation),
+                upper: upper.map(|deviation| nominal + deviation),
+            }),
+        }
+    }
+
+    /// Whether both are of the same feature: its kind, and its place or number.
+    pub fn is_of_the_same_feature(&self, other: &Self) -> bool {
+        self.kind == other.kind && self.feature == other.feature && self.center_mm == other.center_mm
+    }
+
+    /// Whether both are the same characteristic of the same feature.
+    pub(super) fn is_the_same_as(&self, other: &Self) -> bool {
+        self.is_of_the_same_feature(other) && self.quantity == other.quantity && self.datum == other.datum
+    }
+
+    /// What is wrong with it, and what to do.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let Self { name, kind, quantity, .. } = self;
+        if name.trim().is_empty() {
+            return Err("it has no name: give one in the column name".to_owned());
+        }
+        check_kind(name, kind)?;
+        let Some(quantity) = InspectedQuantity::of(quantity) else {
+            return Err(format!(
+                "{name}: there is no quantity {quantity:?}: take one of {}",
+                InspectedQuantity::ALL.map(InspectedQuantity::name).join(", ")
+            ));
+        };
+        if !self.kind().is_some_and(|kind| quantity.is_of(kind)) {
+            let others =
+                InspectedQuantity::ALL.into_iter().filter(|other| self.kind().is_some_and(|kind| other.is_of(kind)));
+            let others = others.map(InspectedQuantity::name).collect::<Vec<_>>().join(", ");
+            return Err(format!("{name}: a {kind} has no {quantity}: take one of {others}"));
+        }
+        self.check_units(quantity)?;
+        self.check_limits(quantity)?;
+        if quantity.needs_place() && self.center_mm.is_none() {
+            return Err(format!(
+                "{name}: {quantity} needs the nominal centre: fill in center_x_mm, center_y_mm and center_z_mm"
+            ));
+        }
+        match &self.datum {
+            Some(_) if !quantity.needs_datum() => {
+                Err(format!("{name}: {quantity} has no datum: leave the columns of the datum empty"))
+            }
+            Some(datum) => check_kind(name, &datum.kind),
+            None if quantity.needs_datum() => {
+                Err(format!("{name}: {quantity} needs a datum: fill in datum_kind, and its centre or its number"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn check_units(&self, quantity: InspectedQuantity) -> Result<(), String> {
+        let of_mm = [
+            ("nominal", self.nominal_mm),
+            ("tolerance", self.tolerance_mm),
+            ("lower_deviation", self.lower_deviation_mm),
+            ("upper_deviation", self.upper_deviation_mm),
+        ];
+        let of_deg = [
+            ("nominal", self.nominal_deg),
+            ("tolerance", self.tolerance_deg),
+            ("lower_deviation", self.lower_deviation_deg),
+            ("upper_deviation", self.upper_deviation_deg),
+        ];
+        let name = &self.name;
+        let (other, wrong) = if quantity.unit() == "mm" { (of_deg, "deg") } else { (of_mm, "mm") };
+        if let Some((column, _)) = other.iter().find(|(_, number)| number.is_some()) {
+            let unit = quantity.unit();
+            return Err(format!(
+                "{name}: {quantity} is in {unit}: put the number into {column}_{unit} and leave {column}_{wrong} empty"
+            ));
+        }
+        let numbers = of_mm.iter().chain(&of_deg).filter_map(|(_, number)| *number);
+        let places = [self.center_mm, self.datum.as_ref().and_then(|datum| datum.center_mm)];
+        match numbers.chain(places.into_iter().flatten().flatten()).find(|number| !number.is_finite()) {
+            Some(number) => Err(format!("{name}: {number} is no finite number")),
+            None => Ok(()),
+        }
+    }
+
+    fn check_limits(&self, quantity: InspectedQuantity) -> Result<(), String> {
+        let (name, unit) = (&self.name, quantity.unit());
+        let nominal = self.nominal_mm.or(self.nominal_deg);
+        if !quantity.is_zone() && nominal.is_none() {
+            return Err(format!("{name}: {quantity} needs a nominal value: fill in nominal_{unit}"));
+        }
+        if quantity.is_zone() && nominal.is_some_and(|nominal| nominal != 0.0) {
+            return Err(format!("{name}: the nominal value of {quantity} is 0: leave nominal_{unit} empty"));
+        }
+        let tolerance = self.tolerance_mm.or(self.tolerance_deg);
+        let lower = self.lower_deviation_mm.or(self.lower_deviation_deg);
+        let upper = self.upper_deviation_mm.or(self.upper_deviation_deg);
+        if tolerance.is_some_and(|tolerance| tolerance <= 0.0) {
+            return Err(format!("{name}: tolerance_{unit} must be above 0"));
+        }
+        if tolerance.is_some() && (lower.is_some() || upper.is_some()) {
+            return Err(format!("{name}: give tolerance_{unit}, or limit deviations, not both"));
+        }
+        match (lower, upper) {
+            (Some(_), _) if quantity.is_zone() => {
+                Err(format!("{name}: {quantity} cannot be below 0: leave lower_deviation_{unit} empty"))
+            }
+            (_, Some(upper)) if quantity.is_zone() && upper <= 0.0 => {
+                Err(format!("{name}: upper_deviation_{unit} must be above 0, it is the width of the zone"))
+            }
+            (Some(lower), Some(upper)) if lower >= upper => Err(format!(
+                "{name}: lower_deviation_{unit} {lower} is not below upper_deviation_{unit} {upper}: exchange them"
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn kind_of(name: &str) -> Option<Kind> {
+    Kind::ALL.into_iter().find(|kind| kind.name() == name)
+}
+
+impl DatumRecord {
+    /// The kind of the feature, once it was checked.
+    pub fn kind(&self) -> Option<Kind> {
+        kind_of(&self.kind)
+    }
+}
+
+fn check_kind(name: &str, kind: &str) -> Result<(), String> {
+    let kinds = || Kind::ALL.map(Kind::name).join(", ");
+    kind_of(kind).map(drop).ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
+}

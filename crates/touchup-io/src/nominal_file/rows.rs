@@ -1,0 +1,132 @@
+//! … as a table.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::error::NominalFileError;
+use super::record::{DatumRecord, NominalRecord};
+use crate::csv_line::csv_line;
+use crate::file_error::{FileError, write_file};
+use crate::table::{Row, TableError, read_table};
+
+/// The columns, in any order; those without a value in any row may be left out.
+const COLUMNS: [&str; 20] = [
+    "name",
+    "kind",
+    "quantity",
+    "nominal_mm",
+    "tolerance_mm",
+    "lower_deviation_mm",
+    "upper_deviation_mm",
+    "nominal_deg",
+    "tolerance_deg",
+    "lower_deviation_deg",
+    "upper_deviation_deg",
+    "center_x_mm",
+    "center_y_mm",
+    "center_z_mm",
+    "feature",
+    "datum_kind",
+    "datum_x_mm",
+    "datum_y_mm",
+    "datum_z_mm",
+    "datum_feature",
+];
+
+/// Columns that must be there.
+const NEEDED: usize = 3;
+
+pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalFileError> {
+    let rows = read_table(path, &[], &COLUMNS)?;
+    let record = |row: &Row| match record_of(row) {
+        Ok(record) => Ok((format!("line {}", row.line), record)),
+        Err(why) => Err(TableError::Line { path: path.to_owned(), line: row.line, why }.into()),
+    };
+    rows.iter().map(record).collect()
+}
+
+fn record_of(row: &Row) -> Result<NominalRecord, String> {
+    let at = |column: &str| COLUMNS.iter().position(|known| *known == column).unwrap_or_default();
+    let text = |column: &str| row.more[at(column)].clone();
+    let number = |column: &str| row.number(at(column), column);
+    let needed =
+        |column: &str| text(column).ok_or_else(|| format!("{column} is empty or the column {column} is missing"));
+    let whole = |column: &str| {
+        let wrong =
+            |text: String| text.parse().map_err(|_| format!("{column} is {text:?} and must be the id of a feature"));
+        text(column).map(wrong).transpose()
+    };
+    let place = |columns: [&str; 3]| {
+        let [x, y, z] = columns.map(number);
+        match (x?, y?, z?) {
+            (Some(x), Some(y), Some(z)) => Ok(Some([x, y, z])),
+            (None, None, None) => Ok(None),
+            _ => Err(format!("{} go together: fill in all three or none", columns.join(", "))),
+        }
+    };
+    let of_datum = (place(["datum_x_mm", "datum_y_mm", "datum_z_mm"])?, whole("datum_feature")?);
+    let datum = match (text("datum_kind"), of_datum) {
+        (Some(kind), (center_mm, feature)) => Some(DatumRecord { kind, center_mm, feature }),
+        (None, (None, None)) => None,
+        (None, _) => return Err("datum_kind is empty: say which kind of feature the datum is".to_owned()),
+    };
+    Ok(NominalRecord {
+        name: needed(COLUMNS[0])?,
+        kind: needed(COLUMNS[1])?,
+        quantity: needed(COLUMNS[NEEDED - 1])?,
+        nominal_mm: number("nominal_mm")?,
+        nominal_deg: number("nominal_deg")?,
+        tolerance_mm: number("tolerance_mm")?,
+        tolerance_deg: number("tolerance_deg")?,
+        lower_deviation_mm: number("lower_deviation_mm")?,
+        upper_deviation_mm: number("upper_deviation_mm")?,
+        lower_deviation_deg: number("lower_deviation_deg")?,
+        upper_deviation_deg: number("upper_deviation_deg")?,
+        center_mm: place(["center_x_mm", "center_y_mm", "center_z_mm"])?,
+        feature: whole("feature")?,
+        datum,
+    })
+}
+
+pub(super) fn write(path: &Path, records: &[NominalRecord], comment: &[&str]) -> Result<(), FileError> {
+    let rows: Vec<_> = records.iter().map(fields_of).collect();
+    let is_used = |column: usize| column < NEEDED || rows.iter().any(|row| !row[column].is_empty());
+    let used: Vec<_> = (0..COLUMNS.len()).filter(|&column| is_used(column)).collect();
+    write_file(path, |out| {
+        comment.iter().try_for_each(|line| writeln!(out, "# {line}"))?;
+        writeln!(out, "{}", csv_line(used.iter().map(|&column| COLUMNS[column])))?;
+        rows.iter().try_for_each(|row| writeln!(out, "{}", csv_line(used.iter().map(|&column| row[column].as_str()))))
+    })
+}
+
+fn fields_of(record: &NominalRecord) -> [String; 20] {
+    let shown = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
+    let place = |center: Option<[f64; 3]>| center.map_or_else(Default::default, |center| center.map(|x| x.to_string()));
+    let whole = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
+    let datum = record.datum.clone().unwrap_or_default();
+    let [x, y, z] = place(record.center_mm);
+    let [u, v, w] = place(datum.center_mm);
+    [
+        // the reader of tables knows no commas within a value
+        record.name.replace(',', ";"),
+        record.kind.clone(),
+        record.quantity.clone(),
+        shown(record.nominal_mm),
+        shown(record.tolerance_mm),
+        shown(record.lower_deviation_mm),
+        shown(record.upper_deviation_mm),
+        shown(record.nominal_deg),
+        shown(record.tolerance_deg),
+        shown(record.lower_deviation_deg),
+        shown(record.upper_deviation_deg),
+        x,
+        y,
+        z,
+        whole(record.feature),
+        datum.kind,
+        u,
+        v,
+        w,
+        whole(datum.feature),
+    ]
+}

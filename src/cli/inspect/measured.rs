@@ -1,0 +1,165 @@
+//! The measured value of a characteristic, out of a file of features.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::conformity::{InspectedQuantity, MeasuredNumber, coordinate_std, position};
+use crate::features::Kind;
+use crate::io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
+
+/// What a file says of a characteristic.
+#[derive(Default)]
+pub(super) struct CharacteristicMeasurement {
+    pub number: Option<MeasuredNumber>,
+    /// why there is none
+    pub why_none: Option<String>,
+    /// the touches behind it: runs of numbers
+    pub runs: Vec<[u32; 2]>,
+}
+
+impl CharacteristicMeasurement {
+    fn none(why: String) -> Self {
+        Self { why_none: Some(why), ..Self::default() }
+    }
+}
+
+/// - `nominal_mm`: centre of the feature in the drawing.
+/// - `datum`: the feature that the quantity relates to.
+pub(super) fn measurement(
+    file: &FeatureFile,
+    feature: &FeatureRecord,
+    kind: Kind,
+    quantity: InspectedQuantity,
+    nominal_mm: Option<[f64; 3]>,
+    datum: Option<&FeatureRecord>,
+) -> CharacteristicMeasurement {
+    let not_measured = || {
+        CharacteristicMeasurement::none(match &*feature.fitted_to {
+            "mesh" => {
+                format!("{quantity} of feature {} was not measured, which was fitted to the mesh: touch it", feature.id)
+            }
+            _ => format!("{quantity} of feature {} was not measured: touch it", feature.id),
+        })
+    };
+    let name = quantity.name();
+    let own = |value: Option<f64>, is_at_least: bool| {
+        let std = feature.std.get(name).copied();
+        (value.map(|value| MeasuredNumber { value, std, is_at_least }), runs_of(feature, name))
+    };
+    let (number, runs) = match quantity {
+        InspectedQuantity::Diameter => own(feature.diameter_mm, false),
+        InspectedQuantity::Width => own(feature.width_mm, false),
+        InspectedQuantity::Length => own(feature.length_mm, false),
+        InspectedQuantity::Depth => own(feature.depth_mm, feature.depth_is_at_least == Some(true)),
+        InspectedQuantity::ConeAngle => own(feature.cone_angle_deg, false),
+        InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
+            let axis = [InspectedQuantity::X, InspectedQuantity::Y, InspectedQuantity::Z]
+                .iter()
+                .position(|one| *one == quantity)
+                .unwrap_or(0);
+            (coordinate(feature, kind, axis), runs_of(feature, surface(feature)))
+        }
+        InspectedQuantity::Position => {
+            let number = feature.center_mm.zip(nominal_mm).and_then(|(centre, nominal)| {
+                let std = feature.std.get("center_mm").copied();
+                position(kind, &Point3::from(centre), feature.axis.map(Vector3::from), std, &Point3::from(nominal))
+            });
+            (number, runs_of(feature, surface(feature)))
+        }
+        InspectedQuantity::Roundness
+        | InspectedQuantity::Cylindricity
+        | InspectedQuantity::Straightness
+        | InspectedQuantity::Flatness => (form(feature, quantity), runs_of(feature, surface(feature))),
+        _ => {
+            let Some(datum) = datum else {
+                return CharacteristicMeasurement::none("its datum was not found".to_owned());
+            };
+            return related(file, feature, datum, quantity);
+        }
+    };
+    match number {
+        None => not_measured(),
+        number => CharacteristicMeasurement { number, why_none: None, runs },
+    }
+}
+
+/// The number of a feature whose touches are those on its surface.
+pub(super) fn surface(feature: &FeatureRecord) -> &'static str {
+    let walls = ["diameter_mm", "width_mm"];
+    walls.into_iter().find(|name| feature.touches.contains_key(*name)).unwrap_or("center_mm")
+}
+
+fn runs_of(feature: &FeatureRecord, name: &str) -> Vec<[u32; 2]> {
+    feature.touches.get(name).cloned().unwrap_or_default()
+}
+
+fn coordinate(feature: &FeatureRecord, kind: Kind, axis: usize) -> Option<MeasuredNumber> {
+    let value = feature.center_mm?[axis];
+    let direction = Vector3::ith(axis, 1.0);
+    let of_centre = feature.std.get("center_mm").copied();
+    let std = of_centre.and_then(|std| coordinate_std(kind, feature.axis.map(Vector3::from), std, &direction));
+    Some(MeasuredNumber { value, std, is_at_least: false })
+}
+
+fn form(feature: &FeatureRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+    let form = feature.form.as_ref()?;
+    let value = match quantity {
+        InspectedQuantity::Roundness => form.roundness_mm,
+        InspectedQuantity::Cylindricity => form.cylindricity_mm,
+        InspectedQuantity::Straightness => form.straightness_mm,
+        _ => form.flatness_mm,
+    };
+    Some(MeasuredNumber { value: value?, std: form.std.get(quantity.name()).copied(), is_at_least: false })
+}
+
+/// A number of a relation by its name.
+pub(super) fn relation_number(relation: &RelationRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+    let value = match quantity {
+        InspectedQuantity::Perpendicularity => relation.perpendicularity_mm,
+        InspectedQuantity::Parallelism => relation.parallelism_mm,
+        InspectedQuantity::Coaxiality => relation.coaxiality_mm,
+        InspectedQuantity::Concentricity => relation.concentricity_mm,
+        InspectedQuantity::Distance => relation.distance_mm,
+        InspectedQuantity::Angle => relation.angle_deg,
+        _ => None,
+    };
+    Some(MeasuredNumber { value: value?, std: relation.std.get(quantity.name()).copied(), is_at_least: false })
+}
+
+fn related(
+    file: &FeatureFile,
+    feature: &FeatureRecord,
+    datum: &FeatureRecord,
+    quantity: InspectedQuantity,
+) -> CharacteristicMeasurement {
+    let find = |of: u32, to: u32| {
+        let of_both = file.relations.iter().filter(|relation| relation.of == of && relation.to == to);
+        of_both.filter_map(|relation| Some((relation, relation_number(relation, quantity)?))).next()
+    };
+    // between two axes the distance and the angle are the same from either
+    let is_same_from_either = |relation: &RelationRecord| match quantity {
+        InspectedQuantity::Angle => true,
+        InspectedQuantity::Distance => relation.kind == "distance",
+        _ => false,
+    };
+    let (of, to) = (feature.id, datum.id);
+    let turned = find(to, of);
+    let number = match (find(of, to), &turned) {
+        (Some((_, number)), _) => number,
+        (None, Some((relation, number))) if is_same_from_either(relation) => *number,
+        (None, Some(_)) => {
+            let why = format!(
+                "the features have {quantity} of {to} to {of} alone: exchange feature and datum in the drawing"
+            );
+            return CharacteristicMeasurement::none(why);
+        }
+        (None, None) => {
+            let why = format!(
+                "the features have no {quantity} of {of} to {to}: touch both, and see which relations docs/features.md has"
+            );
+            return CharacteristicMeasurement::none(why);
+        }
+    };
+    let mut runs = runs_of(feature, surface(feature));
+    runs.extend(runs_of(datum, surface(datum)));
+    CharacteristicMeasurement { number: Some(number), why_none: None, runs }
+}

@@ -1,0 +1,283 @@
+//! From a drawing and what was measured to characteristics with their decisions.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chrono::{SecondsFormat, Utc};
+use nalgebra::{Point3, Vector3};
+
+use super::arguments::InspectArguments;
+use super::drawing::{Drawn, PartDrawing};
+use super::measured::{CharacteristicMeasurement, measurement};
+use super::source::InspectionSource;
+use crate::cli::CliError;
+use crate::conformity::{
+    Assessment, Decision, DecisionParams, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess,
+    match_features,
+};
+use crate::features::Kind;
+use crate::io::features_file::{FeatureFile, FeatureRecord};
+use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
+use crate::io::machine::VERSION;
+use crate::io::nominal_file::NominalRecord;
+
+/// One feature of the drawing, a balloon of the picture.
+pub(super) struct Balloon {
+    /// from 1 on
+    pub number: usize,
+    /// what it is
+    pub kind: String,
+    /// where it is, else where it should be
+    pub place_mm: Option<[f64; 3]>,
+    /// `id` of the feature that was found
+    pub feature: Option<u32>,
+    /// its characteristics, places in the record
+    pub characteristics: Vec<usize>,
+}
+
+/// A whole inspection, as it is shown.
+pub(super) struct Inspected {
+    pub record: InspectionRecord,
+    pub balloons: Vec<Balloon>,
+    /// of each characteristic, the touches behind it: runs of numbers
+    pub runs: Vec<Vec<[u32; 2]>>,
+    /// of each characteristic
+    pub quantities: Vec<InspectedQuantity>,
+}
+
+/// Inspects.
+pub(super) fn inspected(
+    arguments: &InspectArguments,
+    source: &InspectionSource,
+    drawing: &PartDrawing,
+    params: &DecisionParams,
+) -> Result<Inspected, CliError> {
+    let drawn = &drawing.characteristics;
+    let groups = groups_of(drawn);
+    let found = match_all(drawn, &groups, &source.features, arguments.match_mm * 1e-3);
+    let mut balloons = Vec::new();
+    let (mut characteristics, mut runs) =
+        (vec![CharacteristicRecord::default(); drawn.len()], vec![Vec::new(); drawn.len()]);
+    for (number, group) in (1..).zip(&groups) {
+        let first = &drawn[group[0]].nominal;
+        let matched = &found.features[number - 1];
+        let feature = found_feature(matched, &source.features);
+        for (index, &at) in (1..).zip(group) {
+            let place = format!("{number}.{index}");
+            let (record, behind) =
+                characteristic(&drawn[at], place, matched, &found.datums[at], &source.features, (params, arguments));
+            (characteristics[at], runs[at]) = (record, behind);
+        }
+        balloons.push(Balloon {
+            number,
+            kind: first.kind.clone(),
+            place_mm: feature.and_then(|feature| feature.center_mm).or(first.center_mm),
+            feature: feature.map(|feature| feature.id),
+            characteristics: group.clone(),
+        });
+    }
+    let matched: BTreeSet<u32> = balloons.iter().filter_map(|balloon| balloon.feature).collect();
+    let quantities = drawn.iter().map(|drawn| drawn.quantity).collect();
+    let record = record_of(arguments, source, drawing, params, characteristics, &matched);
+    Ok(Inspected { record, balloons, runs, quantities })
+}
+
+/// Characteristics of the same feature of the drawing, in order of the first of each.
+fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (at, one) in drawn.iter().enumerate() {
+        let same = |group: &&mut Vec<usize>| drawn[group[0]].nominal.is_of_the_same_feature(&one.nominal);
+        match groups.iter_mut().find(same) {
+            Some(group) => group.push(at),
+            None => groups.push(vec![at]),
+        }
+    }
+    groups
+}
+
+struct DrawingMatches {
+    /// of each group
+    features: Vec<FeatureMatch>,
+    /// of each characteristic, where it has a datum
+    datums: Vec<Option<FeatureMatch>>,
+}
+
+fn match_all(drawn: &[Drawn], groups: &[Vec<usize>], file: &FeatureFile, reach: f64) -> DrawingMatches {
+    let places: Vec<_> = file.features.iter().filter_map(place_of).collect();
+    let sought: Vec<_> = groups.iter().map(|group| sought_of(drawn, group)).collect();
+    let features = match_features(&sought, &places, reach);
+    let datum = |one: &Drawn| {
+        let datum = one.nominal.datum.as_ref()?;
+        let place = datum.center_mm.map(point);
+        let sought = SoughtFeature { kind: datum.kind()?, id: datum.feature, place, size: None };
+        match_features(&[sought], &places, reach).pop()
+    };
+    DrawingMatches { features, datums: drawn.iter().map(datum).collect() }
+}
+
+fn point(mm: [f64; 3]) -> Point3<f64> {
+    Point3::from(mm) * 1e-3
+}
+
+fn kind_of(name: &str) -> Option<Kind> {
+    Kind::ALL.into_iter().find(|kind| kind.name() == name)
+}
+
+fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
+    let size = feature.diameter_mm.or(feature.width_mm).map(|mm| mm * 1e-3);
+    let axis = feature.axis.map(Vector3::from);
+    Some(FeaturePlace { id: feature.id, kind: kind_of(&feature.kind)?, centre: point(feature.center_mm?), axis, size })
+}
+
+fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {
+    let first = &drawn[group[0]].nominal;
+    let is_size = |at: &&usize| matches!(drawn[**at].quantity, InspectedQuantity::Diameter | InspectedQuantity::Width);
+    let size = group.iter().find(is_size).map(|&at| drawn[at].nominal.nominal() * 1e-3);
+    SoughtFeature { kind: first.kind().unwrap_or_default(), id: first.feature, place: first.center_mm.map(point), size }
+}
+
+fn found_feature<'a>(matched: &FeatureMatch, file: &'a FeatureFile) -> Option<&'a FeatureRecord> {
+    let FeatureMatch::Found(id) = matched else { return None };
+    file.features.iter().find(|feature| feature.id == *id)
+}
+
+/// Why a feature of the drawing has none that was measured.
+fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord) -> String {
+    let place =
+        |center: Option<[f64; 3]>| center.map_or(String::new(), |[x, y, z]| format!(" near ({x:.1} {y:.1} {z:.1}) mm"));
+    match matched {
+        FeatureMatch::Missing if nominal.feature.is_some() => {
+            format!("there is no {kind} {}: see the ids in the features", nominal.feature.unwrap_or_default())
+        }
+        FeatureMatch::Missing => {
+            format!(
+                "no {kind} was found{}: touch it, and check that drawing and mesh share one frame",
+                place(nominal.center_mm)
+            )
+        }
+        FeatureMatch::Ambiguous(ids) => {
+            let ids = ids.iter().map(u32::to_string).collect::<Vec<_>>().join(" and ");
+            format!("it could be {kind} {ids}: name one in the column feature")
+        }
+        FeatureMatch::Shared(id) => {
+            format!(
+                "{kind} {id} could also be another one of the drawing: name them in the column feature, or lower --match-mm"
+            )
+        }
+        FeatureMatch::Found(_) => String::new(),
+    }
+}
+
+fn characteristic(
+    drawn: &Drawn,
+    number: String,
+    matched: &FeatureMatch,
+    datum: &Option<FeatureMatch>,
+    file: &FeatureFile,
+    (params, arguments): (&DecisionParams, &InspectArguments),
+) -> (CharacteristicRecord, Vec<[u32; 2]>) {
+    let Drawn { nominal, quantity, limits, from } = drawn;
+    let feature = found_feature(matched, file);
+    let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
+    let measured = match (feature, datum, datum_feature) {
+        (None, ..) => missing(why_not(matched, &nominal.kind, nominal)),
+        (Some(_), Some(datum), None) => {
+            let record = nominal.datum.clone().unwrap_or_default();
+            let as_nominal =
+                NominalRecord { center_mm: record.center_mm, feature: record.feature, ..NominalRecord::default() };
+            missing(format!("datum: {}", why_not(datum, &record.kind, &as_nominal)))
+        }
+        (Some(feature), ..) => {
+            let kind = nominal.kind().unwrap_or_default();
+            measurement(file, feature, kind, *quantity, nominal.center_mm, datum_feature)
+        }
+    };
+    let assessment = match &measured.number {
+        Some(number) => assess(number, *limits, quantity.distribution(), params),
+        None => Assessment::default(),
+    };
+    let is_of_mesh = feature.is_some_and(|feature| feature.fitted_to == "mesh");
+    let why = assessment.reason.map(|reason| match reason {
+        crate::conformity::OpenReason::NoUncertainty if is_of_mesh => {
+            "it was fitted to the mesh, not to touches, so nothing says how far it is off: touch it".to_owned()
+        }
+        reason => reason.to_string(),
+    });
+    let mut record = CharacteristicRecord {
+        number,
+        name: nominal.name.clone(),
+        kind: nominal.kind.clone(),
+        feature: feature.map(|feature| feature.id),
+        datum: datum_feature.map(|datum| datum.id),
+        quantity: quantity.name().to_owned(),
+        is_at_least: measured.number.is_some_and(|number| number.is_at_least),
+        tolerance_from: from.clone(),
+        decision: assessment.decision.name().to_owned(),
+        reason: measured.why_none.or(why),
+        conformance_probability: assessment.conformance_probability,
+        risk: assessment.risk(),
+        touches: measured.runs.iter().map(|[first, last]| (last - first + 1) as usize).sum(),
+        fitted_to: feature.map_or(String::new(), |feature| feature.fitted_to.clone()),
+        ..CharacteristicRecord::default()
+    };
+    let std = measured.number.and_then(|number| number.std);
+    let actual = measured.number.map(|number| number.value);
+    let numbers = [
+        ("nominal", Some(nominal.nominal())),
+        ("lower_limit", limits.lower),
+        ("upper_limit", limits.upper),
+        ("actual", actual),
+        ("deviation", actual.map(|actual| actual - nominal.nominal())),
+        ("standard_uncertainty", std),
+        ("expanded_uncertainty", std.map(|std| std * arguments.k)),
+        ("acceptance_lower", assessment.acceptance.lower),
+        ("acceptance_upper", assessment.acceptance.upper),
+        ("rejection_lower", assessment.rejection.lower),
+        ("rejection_upper", assessment.rejection.upper),
+    ];
+    numbers.into_iter().for_each(|(name, number)| record.set(name, number));
+    (record, measured.runs)
+}
+
+fn missing(why: String) -> CharacteristicMeasurement {
+    CharacteristicMeasurement { why_none: Some(why), ..CharacteristicMeasurement::default() }
+}
+
+/// Kinds that a drawing would have a characteristic for.
+const COUNTED: [&str; 6] = ["hole", "slot", "pocket", "boss", "cylinder", "notch"];
+
+fn record_of(
+    arguments: &InspectArguments,
+    source: &InspectionSource,
+    drawing: &PartDrawing,
+    params: &DecisionParams,
+    characteristics: Vec<CharacteristicRecord>,
+    matched: &BTreeSet<u32>,
+) -> InspectionRecord {
+    let count = |decision: Decision| characteristics.iter().filter(|one| one.decision == decision.name()).count();
+    let counts: BTreeMap<_, _> =
+        Decision::ALL.into_iter().map(|decision| (decision.name().to_owned(), count(decision))).collect();
+    let verdict = match (count(Decision::Fail), count(Decision::Undecided)) {
+        (0, 0) => Decision::Pass,
+        (0, _) => Decision::Undecided,
+        _ => Decision::Fail,
+    };
+    let counted = source.features.features.iter().filter(|feature| COUNTED.contains(&&*feature.kind));
+    let without: Vec<_> = counted.map(|feature| feature.id).filter(|id| !matched.contains(id)).collect();
+    let files = [drawing.file.clone()].into_iter().chain(source.files.iter().cloned());
+    InspectionRecord {
+        part: arguments.part.clone(),
+        serial: arguments.serial.clone(),
+        operator: arguments.operator.clone(),
+        date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
+        program: format!("touchup {VERSION}"),
+        rule: params.rule.name().to_owned(),
+        confidence: params.confidence,
+        coverage_factor: arguments.k,
+        verdict: verdict.name().to_owned(),
+        counts,
+        files: files.collect(),
+        characteristics,
+        without_characteristic: without,
+        notes: source.notes.iter().chain(&drawing.notes).cloned().collect(),
+    }
+}

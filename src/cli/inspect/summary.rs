@@ -1,0 +1,82 @@
+//! An inspection in a few lines.
+
+use crate::cli::{Losses, counted};
+use crate::conformity::Decision;
+use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
+
+/// The table that is printed.
+pub(super) fn in_words(record: &InspectionRecord) -> String {
+    let width = record.characteristics.iter().map(|one| one.name.chars().count()).max().unwrap_or(0).clamp(14, 40);
+    let k = record.coverage_factor;
+    let head = format!(
+        "{:<6} {:<width$} {:>10} {:>21} {:>22} {:>10}  decision",
+        "no.",
+        "characteristic",
+        "nominal",
+        "limits",
+        format!("actual ± U (k = {k})"),
+        "deviation"
+    );
+    let mut lines = vec![head];
+    lines.extend(record.characteristics.iter().map(|one| row(one, width)));
+    let without = &record.without_characteristic;
+    if !without.is_empty() {
+        let ids = without.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+        lines.push(format!("without a characteristic: {}: {ids}", counted(without.len(), "feature", "features")));
+    }
+    lines.extend(record.notes.iter().cloned());
+    let count = |decision: Decision| record.counts.get(decision.name()).copied().unwrap_or(0);
+    let [pass, undecided, fail] = Decision::ALL.map(count);
+    lines.push(format!(
+        "{}: {pass} pass, {fail} fail, {undecided} undecided; rule {}, {} %",
+        record.verdict.to_uppercase(),
+        record.rule,
+        percent(record.confidence)
+    ));
+    lines.join("\n")
+}
+
+/// A share in percent, with the digits that it has.
+pub(super) fn percent(share: f64) -> f64 {
+    (share * 1e6).round() / 1e4
+}
+
+fn row(one: &CharacteristicRecord, width: usize) -> String {
+    let number = |name: &str| one.number(name).map_or_else(|| "-".to_owned(), |number| format!("{number:.3}"));
+    let limits = format!("{} … {}", number("lower_limit"), number("upper_limit"));
+    let bound = if one.is_at_least { "≥ " } else { "" };
+    let spread = one.number("expanded_uncertainty").map_or(String::new(), |u| format!(" ± {u:.3}"));
+    let actual = one.number("actual").map_or("not measured".to_owned(), |actual| format!("{bound}{actual:.3}{spread}"));
+    let deviation = one.number("deviation").map_or(String::new(), |deviation| format!("{deviation:+.3}"));
+    let name: String = one.name.chars().take(width).collect();
+    let why = one.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
+    format!(
+        "{:<6} {name:<width$} {:>10} {limits:>21} {actual:>22} {deviation:>10}  {}{why}",
+        one.number,
+        number("nominal"),
+        one.decision
+    )
+}
+
+/// Most names in a line.
+const MOST_NAMED: usize = 8;
+
+/// The first names, and how many more there are.
+pub(super) fn first_few(names: &[String], between: &str) -> String {
+    let shown = names.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(between);
+    match names.len().saturating_sub(MOST_NAMED) {
+        0 => shown,
+        more => format!("{shown}{between}and {more} more"),
+    }
+}
+
+/// What was not proved to conform, in one line; empty: all was.
+pub(super) fn losses(record: &InspectionRecord) -> Losses {
+    let named = |decision: Decision, said: &str| {
+        let names: Vec<_> = record.characteristics.iter().filter(|one| one.decision == decision.name()).collect();
+        let all = first_few(&names.iter().map(|one| one.name.clone()).collect::<Vec<_>>(), ", ");
+        let count = record.characteristics.len();
+        (!names.is_empty()).then(|| format!("{} of {count} {said}: {all}", names.len()))
+    };
+    [named(Decision::Fail, "out of tolerance"), named(Decision::Undecided, "undecided")].into_iter().flatten().collect()
+}
