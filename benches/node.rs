@@ -141,8 +141,8 @@ fn beside_pages(faces: usize) {
             let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
             let address = ([127, 0, 0, 1], 0).into();
             let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
-            let facts =
-                NodeFacts { scan: "scan.ply".into(), faces, session_folder: folder.path().to_owned(), nominal: None };
+            let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
+            let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal: None };
             let (port, page) = start(&params, facts, inbox, ready.whole_mesh(), port, |_| ()).expect("a port is free");
             let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
             let _stuck = match kind {

@@ -90,11 +90,11 @@ impl WebFlags {
         let certificate = self.web_certificate.clone().zip(self.web_key.clone());
         let certificate = certificate.map(|(chain, key)| Certificate { chain, key });
         let is_open = certificate.is_none() && !address.ip().is_loopback();
-        let (scan, faces) = ready.scan();
+        let scan = ready.scan().0.to_owned();
         let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, ready.mesh_unit()));
         let nominal = nominal.transpose().map_err(CliError::truth)?.map(|scan| scan.mesh);
-        let facts = NodeFacts { scan: scan.to_owned(), faces, session_folder, nominal };
+        let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal };
         let by_link = self.web_links || !address.ip().is_loopback();
         let params = WebParams { address, names: self.web_name.clone(), by_link, certificate };
         let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;

@@ -4,10 +4,12 @@
 //! file: messages are the plain structs of [`super::messages`], a request carries the closure that answers it.
 
 use std::fmt;
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::messages::*;
 use super::parameters::ParameterValue;
+use crate::reconstruct::Patcher;
 
 /// Tiles that a port keeps for who joins late, the latest, and that are on their way at most: 4 MB.
 pub const TILES_KEPT: usize = 64;
@@ -37,6 +39,8 @@ pub enum Arrival {
     Matched(Endpoint),
     /// somebody new listens to `mesh`
     Viewer,
+    /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made; `None` where nothing was touched
+    Evidence(Reply<Option<Receiver<Patcher>>>),
     /// the process is asked to end
     Shutdown,
 }

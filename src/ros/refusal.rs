@@ -50,6 +50,7 @@ impl Arrival {
         match self {
             Self::Call(call) => call.refuse(code, why),
             Self::SetParameter(_, _, reply) => reply.send(Err(why.to_owned())),
+            Self::Evidence(reply) => reply.send(None),
             _ => {}
         }
     }

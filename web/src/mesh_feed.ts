@@ -5,7 +5,7 @@
 import { CdrError } from "./cdr";
 import type { Connection } from "./connection";
 import { decodeMeshPatch } from "./mesh_patch";
-import { decodeDeviations, isVertexNumbers } from "./vertex_numbers";
+import { decodeVertexNumbers, isVertexNumbers } from "./vertex_numbers";
 import { GapError, type MeshStore } from "./mesh_store";
 
 export interface FeedListeners {
@@ -21,7 +21,7 @@ export function feedMesh(connection: Connection, store: MeshStore, { onChange, o
   connection.onBytes = (frame) => {
     const { session } = store;
     try {
-      if (isVertexNumbers(frame)) store.setDeviations(...decodeDeviations(frame));
+      if (isVertexNumbers(frame)) store.setNumbers(decodeVertexNumbers(frame));
       else store.apply(decodeMeshPatch(frame));
     } catch (error) {
       if (!(error instanceof CdrError || error instanceof GapError)) throw error;

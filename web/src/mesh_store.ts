@@ -7,6 +7,7 @@
  */
 import { DirtyRanges } from "./dirty_ranges";
 import type { MeshPatch } from "./mesh_patch";
+import { WHICH, type VertexNumbers } from "./vertex_numbers";
 
 /** The patch does not belong to what is here: the whole state has to come again. */
 export class GapError extends Error {}
@@ -101,14 +102,27 @@ export class MeshStore {
     this.whole = { vertices: new Uint8Array(this.positions.length / 3), faces: new Uint8Array(this.corners.length / 3) };
   }
 
-  /** Takes up deviations from the nominal part, m, of vertices that are here. */
-  setDeviations(vertices: Uint32Array, deviations: Float32Array): void {
-    this.deviation ??= new Float32Array(this.positions.length / 3).fill(FAR);
+  /** Takes up numbers of vertices that are here. */
+  setNumbers({ which, vertices, numbers }: VertexNumbers): void {
+    if (which === WHICH.outlier) this.forgetOutliers();
+    if (which === WHICH.deviation) this.deviation ??= new Float32Array(this.positions.length / 3).fill(FAR);
     for (let i = 0; i < vertices.length; i++) {
       const vertex = vertices[i];
-      if (vertex >= this.deviation.length) continue;
-      this.deviation[vertex] = Number.isNaN(deviations[i]) ? FAR : deviations[i];
+      if (3 * vertex >= this.positions.length) continue;
+      if (which === WHICH.sigma) this.variance[vertex] = numbers[i] >= 0 ? numbers[i] ** 2 : -1;
+      else if (which === WHICH.outlier) this.quality[4 * vertex + QUALITY.outlier] = 1;
+      else if (this.deviation !== null) this.deviation[vertex] = Number.isNaN(numbers[i]) ? FAR : numbers[i];
       this.dirtyVertices.mark(vertex);
+    }
+    if (which === WHICH.outlier) this.hasOutliers = vertices.length > 0;
+  }
+
+  private forgetOutliers(): void {
+    if (!this.hasOutliers) return;
+    for (let q = QUALITY.outlier; q < this.quality.length; q += 4) {
+      if (this.quality[q] === 0) continue;
+      this.quality[q] = 0;
+      this.dirtyVertices.mark((q - QUALITY.outlier) / 4);
     }
   }
 
@@ -118,6 +132,7 @@ export class MeshStore {
     this.vertexCount = 0;
     this.version = 0;
     this.deviation = null;
+    this.hasOutliers = false;
     this.low.fill(Infinity);
     this.high.fill(-Infinity);
   }

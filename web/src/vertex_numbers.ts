@@ -1,26 +1,42 @@
-/** A number for each of some vertices, beside the mesh: how far they are from the nominal part. */
+/** A number for each of some vertices, beside the mesh: what it is coloured by and no patch says. */
 import { CdrError } from "./cdr";
 
-/** First byte of such a frame, and the second of one with deviations, m. */
+/** First byte of such a frame. */
 const KIND = 2;
-const DEVIATION = 1;
 /** Bytes before the numbers of the vertices. */
 const HEAD = 8;
+
+/** The second byte: which number. */
+export const WHICH = {
+  /** From the nominal part, m; NaN where that is far. */
+  deviation: 1,
+  /** Standard uncertainty along the normal, m. */
+  sigma: 2,
+  /** 1 where a contact nearby was rejected; vertices that are not named have none. */
+  outlier: 3,
+} as const;
+
+export interface VertexNumbers {
+  which: number;
+  vertices: Uint32Array;
+  numbers: Float32Array;
+}
 
 export function isVertexNumbers(frame: ArrayBuffer): boolean {
   return frame.byteLength > 0 && new Uint8Array(frame, 0, 1)[0] === KIND;
 }
 
 /**
- * Vertices and their deviations, m, as views into the frame; NaN where the nominal part is far.
+ * Vertices and their numbers, as views into the frame.
  *
  * @throws CdrError when the frame is none of these.
  */
-export function decodeDeviations(frame: ArrayBuffer): [vertices: Uint32Array, deviations: Float32Array] {
+export function decodeVertexNumbers(frame: ArrayBuffer): VertexNumbers {
   if (frame.byteLength < HEAD) throw new CdrError(`${frame.byteLength} bytes are too few`);
   const view = new DataView(frame);
+  const which = view.getUint8(1);
   const count = view.getUint32(4, true);
-  if (view.getUint8(1) !== DEVIATION) throw new CdrError(`number ${view.getUint8(1)} of vertices is not known here`);
+  if (!Object.values<number>(WHICH).includes(which)) throw new CdrError(`number ${which} of vertices is not known here`);
   if (frame.byteLength !== HEAD + 8 * count) throw new CdrError(`${frame.byteLength} bytes are not those of ${count} vertices`);
-  return [new Uint32Array(frame, HEAD, count), new Float32Array(frame, HEAD + 4 * count, count)];
+  return { which, vertices: new Uint32Array(frame, HEAD, count), numbers: new Float32Array(frame, HEAD + 4 * count, count) };
 }

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { CdrError } from "../src/cdr";
-import { FAR, MeshStore } from "../src/mesh_store";
-import { decodeDeviations, isVertexNumbers } from "../src/vertex_numbers";
+import { FAR, MeshStore, QUALITY } from "../src/mesh_store";
+import { decodeVertexNumbers, isVertexNumbers } from "../src/vertex_numbers";
 
 /** Written byte by byte, as the frame is described. */
 function frame(vertices: number[], numbers: number[], kind = 2, which = 1): ArrayBuffer {
@@ -15,26 +15,43 @@ function frame(vertices: number[], numbers: number[], kind = 2, which = 1): Arra
   return bytes;
 }
 
-describe("deviations of vertices", () => {
+describe("numbers of vertices", () => {
   it("come with the numbers of their vertices", () => {
     const bytes = frame([3, 900], [0.5, -0.25]);
     expect(isVertexNumbers(bytes)).toBe(true);
-    const [vertices, deviations] = decodeDeviations(bytes);
+    const { which, vertices, numbers } = decodeVertexNumbers(bytes);
+    expect(which).toBe(1);
     expect([...vertices]).toEqual([3, 900]);
-    expect([...deviations]).toEqual([0.5, -0.25]);
+    expect([...numbers]).toEqual([0.5, -0.25]);
   });
 
   it("are refused where the frame is cut off, longer, or of another number", () => {
     expect(isVertexNumbers(frame([1], [1], 1))).toBe(false);
-    expect(() => decodeDeviations(frame([1], [1]).slice(0, 12))).toThrow(CdrError);
-    expect(() => decodeDeviations(new ArrayBuffer(4))).toThrow(CdrError);
-    expect(() => decodeDeviations(frame([1], [1], 2, 9))).toThrow(CdrError);
+    expect(() => decodeVertexNumbers(frame([1], [1]).slice(0, 12))).toThrow(CdrError);
+    expect(() => decodeVertexNumbers(new ArrayBuffer(4))).toThrow(CdrError);
+    expect(() => decodeVertexNumbers(frame([1], [1], 2, 9))).toThrow(CdrError);
   });
 
   it("are kept for vertices that are there, and far where nobody measured them", () => {
     const store = new MeshStore();
     store.positions = new Float32Array(9);
-    store.setDeviations(...decodeDeviations(frame([0, 1, 77], [0.001, Number.NaN, 1])));
+    store.setNumbers(decodeVertexNumbers(frame([0, 1, 77], [0.001, Number.NaN, 1])));
     expect([...(store.deviation ?? [])]).toEqual([Math.fround(0.001), FAR, FAR]);
+  });
+
+  it("are variances where they are standard uncertainties, and marks where contacts were rejected", () => {
+    const store = new MeshStore();
+    store.positions = new Float32Array(9);
+    store.variance = new Float32Array(3).fill(-1);
+    store.quality = new Uint8Array(12);
+    store.setNumbers(decodeVertexNumbers(frame([2], [0.5], 2, 2)));
+    expect([...store.variance]).toEqual([-1, -1, 0.25]);
+    const marks = () => [0, 1, 2].map((vertex) => store.quality[4 * vertex + QUALITY.outlier]);
+    store.setNumbers(decodeVertexNumbers(frame([0, 1], [1, 1], 2, 3)));
+    expect([marks(), store.hasOutliers]).toEqual([[1, 1, 0], true]);
+    store.setNumbers(decodeVertexNumbers(frame([2], [1], 2, 3)));
+    expect(marks()).toEqual([0, 0, 1]);
+    store.setNumbers(decodeVertexNumbers(frame([], [], 2, 3)));
+    expect([marks(), store.hasOutliers]).toEqual([[0, 0, 0], false]);
   });
 });

@@ -192,6 +192,7 @@ impl RefinementWorker {
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
             Arrival::Viewer => self.setup.shared.has_new_viewer.store(true, Ordering::Relaxed),
+            Arrival::Evidence(reply) => reply.send(self.session.engine.copy_patcher().ok().flatten()),
             Arrival::Shutdown => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())

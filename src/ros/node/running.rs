@@ -17,6 +17,7 @@ use super::side_work::begin;
 use super::view::View;
 use crate::clock::Clock;
 use crate::io::mesh_file::MeshUnit;
+use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Arrivals;
 use crate::ros::messages::MeshPatch;
 use crate::ros::parameters::{ParameterValue, Parameters};
@@ -88,6 +89,11 @@ impl Prepared {
         let shared = &self.setup.shared;
         let (replica, _) = shared.mesh.now();
         MeshPatches::of(&replica, shared.scan_sigma).whole(replica, shared.frame.clone())
+    }
+
+    /// The scan, or the region of it that is refined, with the tree over its faces.
+    pub fn scan_mesh(&self) -> Arc<(TriMesh, FaceTree)> {
+        Arc::clone(&self.setup.scan)
     }
 
     /// The scene as it was read.

@@ -1,11 +1,12 @@
 //! What the pages are shown: the newest of each topic, and the mesh. The node writes, and each page reads at its own pace.
 
 use std::collections::VecDeque;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
 use tokio::sync::watch;
 
+use super::knowledge::{Known, MeshState, TouchedVertex};
 use super::mesh_copy::{MeshCopy, PageId};
 use crate::ros::locked;
 use crate::ros::messages::{
@@ -75,6 +76,7 @@ fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
 pub(super) struct Board {
     mesh: Mutex<MeshCopy>,
     topics: Mutex<Topics>,
+    known: Mutex<Option<Arc<Known>>>,
     changes: watch::Sender<()>,
 }
 
@@ -83,7 +85,12 @@ impl Board {
     pub fn new(whole: impl Iterator<Item = MeshPatch>) -> Self {
         let mut mesh = MeshCopy::default();
         whole.for_each(|part| mesh.take(part));
-        Self { mesh: Mutex::new(mesh), topics: Mutex::default(), changes: watch::Sender::new(()) }
+        Self {
+            mesh: Mutex::new(mesh),
+            topics: Mutex::default(),
+            known: Mutex::default(),
+            changes: watch::Sender::new(()),
+        }
     }
 
     /// Takes up what the node publishes.
@@ -157,6 +164,28 @@ impl Board {
     /// More of the mesh for a page; as [`MeshCopy::next_for`].
     pub fn mesh_for(&self, page: PageId) -> Option<MeshPatch> {
         locked(&self.mesh).next_for(page)
+    }
+
+    /// Session and version of the mesh.
+    pub fn mesh_state(&self) -> MeshState {
+        locked(&self.mesh).state()
+    }
+
+    /// The vertices that rest on touches.
+    pub fn touched(&self) -> Vec<TouchedVertex> {
+        locked(&self.mesh).touched()
+    }
+
+    /// What is known of the vertices at a state.
+    pub fn set_known(&self, known: Known) {
+        *locked(&self.known) = Some(Arc::new(known));
+        self.wake();
+    }
+
+    /// … that is the one in which the mesh is now.
+    pub fn known(&self) -> Option<Arc<Known>> {
+        let known = locked(&self.known).clone()?;
+        (known.state == self.mesh_state()).then_some(known)
     }
 
     /// Name of the session.

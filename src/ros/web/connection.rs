@@ -17,6 +17,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use super::Site;
 use super::access::Role;
 use super::board::text_of;
+use super::knowledge::MeshState;
 use super::mesh_copy::PageId;
 use crate::ros::messages::MeshPatch;
 use crate::ros::port::Reply;
@@ -119,6 +120,7 @@ async fn send(
     let mut frames = interval(FRAME);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut seen, mut state, mut noted, mut signed) = (0, String::new(), String::new(), Instant::now());
+    let mut known_state = MeshState::default();
     loop {
         let mut messages = Vec::new();
         while let Ok(answer) = answers.try_recv() {
@@ -144,6 +146,11 @@ async fn send(
             // a millisecond for each thousand vertices, in which no other page is to wait
             let frame = tokio::task::spawn_blocking(move || nominal.frame(&patch)).await;
             messages.extend(frame.ok().flatten().map(Message::binary));
+        }
+        // what is known of vertices comes after them
+        if !has_more && let Some(known) = site.board.known().filter(|known| known.state != known_state) {
+            known_state.clone_from(&known.state);
+            messages.extend(known.frames.iter().cloned().map(Message::binary));
         }
         if signed.elapsed() >= SIGN_OF_LIFE {
             signed = Instant::now();

@@ -4,7 +4,11 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Point3;
+
+use super::knowledge::{MeshState, TouchedVertex};
 use crate::mesh::IdSet;
+use crate::reconstruct::Support;
 use crate::ros::messages::{MeshPatch, Time};
 
 /// Vertices, or faces, of one message at most: 1.4 MB.
@@ -14,6 +18,16 @@ const OF_A_MESSAGE: usize = 1 << 16;
 const NO_VERTEX: u8 = u8::MAX;
 /// Corners of a face that is not there.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
+
+/// What a vertex rests on that does not rest on the scan.
+fn known_by(support: u8) -> Option<Support> {
+    match support {
+        MeshPatch::SUPPORT_TOUCHED => Some(Support::Touched),
+        MeshPatch::SUPPORT_GUESSED => Some(Support::Guessed),
+        MeshPatch::SUPPORT_UNREACHABLE => Some(Support::Unreachable),
+        _ => None,
+    }
+}
 
 /// Number of a page, never given twice.
 pub(super) type PageId = u64;
@@ -151,6 +165,20 @@ impl MeshCopy {
     /// It has gone.
     pub fn leave(&mut self, page: PageId) {
         self.pages.remove(&page);
+    }
+
+    /// Session and version.
+    pub fn state(&self) -> MeshState {
+        (self.session.clone(), self.version)
+    }
+
+    /// The vertices that rest on touches, on a guess between them or beside them.
+    pub fn touched(&self) -> Vec<TouchedVertex> {
+        let place = |at: usize| Point3::from(self.positions[at].map(f64::from));
+        let vertices = (0..).zip(&self.support);
+        let touched =
+            vertices.filter_map(|(vertex, support)| Some((vertex, place(vertex as usize), known_by(*support)?)));
+        touched.collect()
     }
 
     /// Name of the session.

@@ -11,10 +11,12 @@ mod calls;
 mod connection;
 mod downloads;
 mod http;
+mod knowledge;
 mod listener;
 mod mesh_copy;
 mod nominal;
 mod page;
+mod vertex_numbers;
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
@@ -42,7 +44,7 @@ use super::inbox::Inbox;
 use super::messages::MeshPatch;
 use super::port::{Port, Publication};
 use super::stop::Motion;
-use crate::mesh::TriMesh;
+use crate::mesh::{FaceTree, TriMesh};
 
 /// Why the page is not served.
 #[derive(Debug, thiserror::Error)]
@@ -85,12 +87,12 @@ pub struct WebParams {
 }
 
 /// What a page is told of the node, and does not change.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct NodeFacts {
     /// where the scan was read from
     pub scan: PathBuf,
-    /// its faces
-    pub faces: usize,
+    /// it, m in O, with the tree over its faces
+    pub scan_mesh: Arc<(TriMesh, FaceTree)>,
     /// where sessions lie, each in a folder of its own
     pub session_folder: PathBuf,
     /// the part as it should be, m in O; `None`: nobody said
@@ -106,6 +108,8 @@ struct Site {
     annotations: Annotations,
     nominal: Option<Arc<Nominal>>,
     scan: ScanShown,
+    /// with the tree over its faces
+    scan_mesh: Arc<(TriMesh, FaceTree)>,
     session_folder: PathBuf,
     /// pages that are open
     pages: AtomicUsize,
@@ -292,7 +296,8 @@ pub fn start(
         access,
         annotations: Annotations::new(&facts.session_folder),
         nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
-        scan: ScanShown { file, faces: facts.faces },
+        scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
+        scan_mesh: facts.scan_mesh,
         session_folder: facts.session_folder,
         pages: AtomicUsize::new(0),
         pages_so_far: AtomicU64::new(0),
@@ -304,11 +309,12 @@ pub fn start(
         false => Vec::new(),
     };
     let (stop, router) = (Arc::new(Notify::new()), http::router(Arc::clone(&site)));
-    let stopped = Arc::clone(&stop);
+    let (stopped, followed) = (Arc::clone(&stop), Arc::clone(&site));
     let serve = move || {
         runtime.block_on(async {
             tokio::select! {
                 () = listener::serve(listener, tls, router) => {}
+                () = knowledge::follow(followed) => {}
                 () = stopped.notified() => {}
             }
         });

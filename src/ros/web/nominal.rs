@@ -2,15 +2,12 @@
 
 use nalgebra::Point3;
 
+use super::vertex_numbers::{VertexNumber, frame};
 use crate::mesh::{FaceTree, TriMesh, signed_distance};
 use crate::ros::messages::MeshPatch;
 
 /// Deviations are looked for within this distance, m: farther off is another part.
 const REACH: f64 = 20e-3;
-/// Kind of a binary message: a number for each of some vertices.
-const VERTEX_NUMBERS: u8 = 2;
-/// … which is the deviation from the nominal part, m.
-const DEVIATION: u8 = 1;
 
 /// The part as it should be, in the frame of the mesh.
 #[derive(Debug)]
@@ -27,18 +24,12 @@ impl Nominal {
 
     /// Deviations of the vertices that a patch sets, positive outside of the nominal part; NaN beyond the reach. `None` where it
     /// sets none.
-    ///
-    /// The kind, which number, two zeros; how many, their vertices as u32, their numbers as f32; little endian.
     pub fn frame(&self, patch: &MeshPatch) -> Option<Vec<u8>> {
         if patch.vertices.is_empty() {
             return None;
         }
-        let mut frame = Vec::with_capacity(8 + 8 * patch.vertices.len());
-        frame.extend([VERTEX_NUMBERS, DEVIATION, 0, 0]);
-        frame.extend((patch.vertices.len() as u32).to_le_bytes());
-        frame.extend(patch.vertices.iter().flat_map(|vertex| vertex.to_le_bytes()));
-        frame.extend(patch.positions.as_chunks().0.iter().flat_map(|place| self.deviation(place).to_le_bytes()));
-        Some(frame)
+        let deviations = patch.positions.as_chunks().0.iter().map(|place| self.deviation(place));
+        Some(frame(VertexNumber::Deviation, patch.vertices.iter().copied().zip(deviations)))
     }
 
     fn deviation(&self, place: &[f32; 3]) -> f32 {

@@ -356,7 +356,8 @@ impl Patcher {
         if let Some(radius) = self.params.ball() {
             mark_unreachable(&mesh, &mut support, &self.history.free_space, radius)?;
         }
-        let sigma = self.sigma(scan, tree, &mesh, &support);
+        let places = mesh.positions().iter().copied().zip(support.iter().copied());
+        let sigma = self.sigma(scan, tree, places);
         Ok(Patched {
             mesh,
             support,
@@ -369,13 +370,23 @@ impl Patcher {
         })
     }
 
-    /// Standard deviation of each vertex, where the settings ask for it.
-    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, mesh: &TriMesh, support: &[Support]) -> Vec<f64> {
+    /// Standard deviation along the normal at places of the patch, m, by all touches so far; empty where the settings ask for none.
+    ///
+    /// - `scan`, `tree`: as in [`Self::patched`].
+    /// - `places`: vertices of the patch, m, in O, and what each rests on.
+    pub fn sigma_at(&mut self, scan: &TriMesh, tree: &FaceTree, places: &[(Point3<f64>, Support)]) -> Vec<f64> {
+        self.history.contacts.note_all();
+        self.update(scan, tree);
+        self.sigma(scan, tree, places.iter().copied())
+    }
+
+    /// Standard deviation at each place, where the settings ask for it.
+    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, places: impl Iterator<Item = (Point3<f64>, Support)>) -> Vec<f64> {
         let Some(uncertainty) = &self.params.uncertainty else { return Vec::new() };
         let evidence = Evidence { prior: None, ..self.evidence(scan, tree, None) };
         let (window_ns, mut scratch) = (self.params.window_ns(), FieldScratch::default());
-        let mut of = |(p, &support)| vertex_sigma(&evidence, p, support, uncertainty.scan, window_ns, &mut scratch);
-        mesh.positions().iter().zip(support).map(&mut of).collect()
+        let mut of = |(p, support)| vertex_sigma(&evidence, &p, support, uncertainty.scan, window_ns, &mut scratch);
+        places.map(&mut of).collect()
     }
 
     /// What changed in the patch since the last call. The time depends on how much there is to remesh near the changes. Its faces are

@@ -1,0 +1,76 @@
+//! How well the mesh is known where it was touched, for the colours of the page: evaluated while nothing changes, and only where somebody
+//! looks.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use nalgebra::Point3;
+use tokio::sync::oneshot;
+use tokio::time::sleep;
+
+use super::Site;
+use super::vertex_numbers::{VertexNumber, frame};
+use crate::mesh::{FaceTree, TriMesh};
+use crate::reconstruct::{Patcher, Support};
+use crate::ros::port::{Arrival, Reply};
+
+/// Period of the look at the mesh.
+const LOOK: Duration = Duration::from_millis(250);
+/// The mesh is at rest when it has not changed for so long: somewhat longer than the node takes to settle it.
+const QUIET: Duration = Duration::from_millis(1000);
+/// How long the copy of the evidence may take.
+const COPY_WAIT: Duration = Duration::from_secs(30);
+/// Vertices this near to a contact that was rejected are marked, m.
+const BESIDE_OUTLIER: f64 = 1e-3;
+
+/// A state of the mesh: session and version.
+pub(super) type MeshState = (String, u64);
+/// A vertex that rests on touches: its number, its place, m in O, and its support.
+pub(super) type TouchedVertex = (u32, Point3<f64>, Support);
+
+/// What is known of the vertices at one state, as frames for the pages.
+#[derive(Debug)]
+pub(super) struct Known {
+    pub state: MeshState,
+    pub frames: Vec<Vec<u8>>,
+}
+
+/// Evaluates each state at which the mesh rests, until it is dropped.
+pub(super) async fn follow(site: Arc<Site>) {
+    let (mut seen, mut still, mut done) = (MeshState::default(), Instant::now(), MeshState::default());
+    loop {
+        sleep(LOOK).await;
+        let state = site.board.mesh_state();
+        if state != seen {
+            (seen, still) = (state, Instant::now());
+            continue;
+        }
+        if state == done || still.elapsed() < QUIET || site.pages.load(Ordering::Relaxed) == 0 {
+            continue;
+        }
+        done.clone_from(&state);
+        let (to, copy) = oneshot::channel();
+        // who asked is still there
+        site.inbox.put(Arrival::Evidence(Reply::new(move |copy| drop(to.send(copy)))));
+        let Ok(Some(copy)) = copy.await else { continue };
+        let (scan, touched) = (Arc::clone(&site.scan_mesh), site.board.touched());
+        let evaluated = tokio::task::spawn_blocking(move || frames_of(&copy, &scan, &touched)).await;
+        if let Ok(frames) = evaluated {
+            site.board.set_known(Known { state, frames });
+        }
+    }
+}
+
+fn frames_of(copy: &Receiver<Patcher>, scan: &(TriMesh, FaceTree), touched: &[TouchedVertex]) -> Vec<Vec<u8>> {
+    let Ok(mut patcher) = copy.recv_timeout(COPY_WAIT) else { return Vec::new() };
+    patcher.flush();
+    let places: Vec<_> = touched.iter().map(|(_, place, support)| (*place, *support)).collect();
+    let sigmas = patcher.sigma_at(&scan.0, &scan.1, &places);
+    let of_sigma = touched.iter().zip(sigmas).map(|((vertex, ..), sigma)| (*vertex, sigma as f32));
+    let outliers: Vec<_> = patcher.outliers().last().map(|outlier| outlier.point).collect();
+    let is_beside = |place: &Point3<f64>| outliers.iter().any(|point| (point - place).norm() < BESIDE_OUTLIER);
+    let beside = touched.iter().filter(|(_, place, _)| is_beside(place)).map(|(vertex, ..)| (*vertex, 1.0));
+    vec![frame(VertexNumber::Sigma, of_sigma), frame(VertexNumber::Outlier, beside)]
+}
