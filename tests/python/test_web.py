@@ -9,6 +9,7 @@ import subprocess
 import time
 from urllib.parse import urlsplit
 
+import igl
 import numpy
 import pytest
 import trimesh
@@ -16,7 +17,7 @@ from conftest import ROOT
 from ros_domains import domains
 from ros_process import Process, play
 from scipy.spatial import cKDTree
-from web_page import PROTOCOL, PageNode, Socket, page_url
+from web_page import DEVIATION, OUTLIER, PROTOCOL, SIGMA, PageNode, Socket, page_url
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 
@@ -233,7 +234,8 @@ def test_what_is_wrong_with_the_flags_is_said(touchup, demo_folder, tmp_path, ar
 def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_nothing_holds_nobody_up(
     touchup_bin, demo_folder, tmp_path
 ):
-    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply") as node, Socket(node.url) as early:
+    nominal = ["--web-nominal", demo_folder / "truth.ply"]
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", *nominal) as node, Socket(node.url) as early:
         early.take_until(lambda: early.faces)
         # it asks for the socket and reads nothing more
         place = urlsplit(node.url)
@@ -263,9 +265,33 @@ def test_pages_have_the_nodes_mesh_however_late_they_join_and_one_that_takes_not
         ours, theirs = (numpy.asarray(triangles).mean(axis=1) for triangles in (corners * 1e3, mesh.triangles))
         distances, nearest = cKDTree(theirs).query(ours)
         assert distances.max() < 1e-3 and len(set(nearest)) == len(theirs)
+        # how well each vertex is known is what is saved beside it
+        early.take_until(lambda: SIGMA in early.numbers_of and OUTLIER in early.numbers_of)
+        columns = mesh.metadata["_ply_raw"]["vertex"]["data"]
+        sigma_of = {tuple(place): sigma for place, sigma in zip(columns_of(columns, "xyz"), columns["sigma_mm"].ravel(), strict=True)}
+        tree = cKDTree(list(sigma_of))
+        known = [(vertex, sigma) for vertex, sigma in early.numbers_of[SIGMA].items() if vertex in early.vertices]
+        far, at = tree.query([numpy.array(early.vertices[vertex]) * 1e3 for vertex, _ in known])
+        ratio = numpy.array([sigma * 1e3 for _, sigma in known]) / numpy.array(list(sigma_of.values()))[at]
+        assert far.max() < 1e-3 and len(known) > 1000 and numpy.abs(ratio[early_is_touched(early, known)] - 1).max() < 1e-3
+        # deviations are those that libigl finds from the part as it is
+        truth = trimesh.load(demo_folder / "truth.ply", process=False)
+        measured = {vertex: far for vertex, far in early.numbers_of[DEVIATION].items() if vertex in early.vertices}
+        assert measured.keys() == early.vertices.keys()
+        places = numpy.array([early.vertices[vertex] for vertex in measured]) * 1e3
+        squared, _, _ = igl.point_mesh_squared_distance(places, truth.vertices, truth.faces.astype(numpy.int64))
+        assert numpy.abs(numpy.abs(list(measured.values())) * 1e3 - numpy.sqrt(squared)).max() < 1e-3
         slow.close()
         assert node.end() in (0, 4), node.text()
 
+
+
+def columns_of(columns, names):
+    return numpy.stack([columns[name].ravel() for name in names], axis=1).astype(float)
+
+
+def early_is_touched(page, known):
+    return numpy.array([page.support[vertex] == 1 for vertex, _ in known])
 
 
 def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_then(touchup_bin, touchup, demo_folder, tmp_path):

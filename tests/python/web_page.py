@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import re
+import struct
 import time
 
 from conftest import ROOT
@@ -19,6 +20,7 @@ store.register(get_types_from_msg((ROOT / "msg/msg/MeshPatch.msg").read_text(), 
 PROTOCOL = "touchup.v1"
 # kind 1, a message of DDS in little endian behind its encapsulation
 MESH_PATCH = bytes([1, 0, 0, 0])
+DEVIATION, SIGMA, OUTLIER = 1, 2, 3
 
 
 class PageNode(Node):
@@ -62,14 +64,18 @@ class Socket:
         self.socket = self.opened.enter_context(connect(address, additional_headers=headers, compression=None, **options))
         self.numbers = itertools.count(1)
         self.newest, self.counts, self.answers = {}, {}, {}
+        # by kind: DEVIATION, SIGMA, OUTLIER; then by vertex
+        self.numbers_of = {}
         self.session, self.version, self.vertices, self.faces, self.support = "", 0, {}, {}, {}
 
     def take(self, timeout=DEADLINE_S):
         """Takes the next message up."""
         message = self.socket.recv(timeout)
         if isinstance(message, bytes):
-            assert message[:4] == MESH_PATCH
-            self.take_patch(store.deserialize_cdr(message[4:], "touchup_msgs/msg/MeshPatch"))
+            if message[:4] == MESH_PATCH:
+                self.take_patch(store.deserialize_cdr(message[4:], "touchup_msgs/msg/MeshPatch"))
+            else:
+                self.take_numbers(message)
             return
         message = json.loads(message)
         if topic := message.get("topic"):
@@ -77,6 +83,15 @@ class Socket:
             self.counts[topic] = self.counts.get(topic, 0) + 1
         else:
             self.answers[message["id"]] = message
+
+    def take_numbers(self, message):
+        """A number for each of some vertices, little endian: 2, which, two zeros, how many, vertices (u32), numbers (f32)."""
+        assert message[0] == 2 and message[2:4] == bytes(2)
+        (count,) = struct.unpack_from("<I", message, 4)
+        assert len(message) == 8 + 8 * count
+        vertices = struct.unpack_from(f"<{count}I", message, 8)
+        numbers = struct.unpack_from(f"<{count}f", message, 8 + 4 * count)
+        self.numbers_of.setdefault(message[1], {}).update(zip(vertices, numbers, strict=True))
 
     def take_patch(self, patch):
         if patch.base_version == 0 and patch.part == 0:

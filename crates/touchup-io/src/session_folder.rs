@@ -216,3 +216,64 @@ pub fn fingerprint(path: &Path) -> io::Result<(PathBuf, u32)> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    /// Two sessions, a link to elsewhere, a hidden folder, and a file that is no session.
+    fn sessions() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, file, text) in
+            [("one", "a.ply", "ply"), ("two", "b.json", "{}"), ("two", "a.ply", "ply\n"), (".hidden", "x", "x")]
+        {
+            fs::create_dir_all(folder.path().join(name)).unwrap();
+            write_text_file(&folder.path().join(name).join(file), text).unwrap();
+        }
+        fs::create_dir(folder.path().join("two/recording")).unwrap();
+        write_text_file(&folder.path().join("notes.txt"), "no session").unwrap();
+        symlink("/etc", folder.path().join("linked")).unwrap();
+        symlink("/etc/hostname", folder.path().join("two/link.json")).unwrap();
+        folder
+    }
+
+    #[test]
+    fn sessions_are_listed_from_the_newest_on_with_their_plain_files() {
+        let folder = sessions();
+        let listed = list_sessions(folder.path()).unwrap();
+        let session = |name: &str, bytes, files: &[&str]| ListedSession {
+            name: name.to_owned(),
+            bytes,
+            files: files.iter().map(|&file| file.to_owned()).collect(),
+        };
+        assert_eq!(listed, [session("two", 6, &["a.ply", "b.json"]), session("one", 3, &["a.ply"])]);
+    }
+
+    #[test]
+    fn only_plain_files_of_sessions_are_opened() {
+        let folder = sessions();
+        let mut text = String::new();
+        let (mut file, length) = open_file(folder.path(), "two", "a.ply").unwrap();
+        file.read_to_string(&mut text).unwrap();
+        assert_eq!((text.as_str(), length), ("ply\n", 4));
+        for (session, file) in [
+            ("two", "link.json"),
+            ("two", "recording"),
+            ("two", "../one/a.ply"),
+            ("two", ".."),
+            ("two", ""),
+            ("..", "notes.txt"),
+            ("", "notes.txt"),
+            (".hidden", "x"),
+            ("linked", "hostname"),
+            ("/etc", "hostname"),
+            ("two", "/etc/hostname"),
+            ("two", "a.ply\0"),
+            ("missing", "a.ply"),
+        ] {
+            assert!(open_file(folder.path(), session, file).is_err(), "{session}/{file}");
+        }
+    }
+}

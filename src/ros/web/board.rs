@@ -109,7 +109,6 @@ impl Board {
                 Publication::Diagnostics(diagnostics) => topics.diagnostics.write(number, diagnostics),
                 Publication::ProbeResult(result) => keep(&mut topics.results, number, result),
                 Publication::ProbeTouch(touch) => keep(&mut topics.touches, number, touch),
-                // the same as mesh patches and features, drawn for RViz
                 Publication::Tile(_) | Publication::FeatureMarkers(_) | Publication::MeshPatch(_) => return,
             }
         }

@@ -343,7 +343,10 @@ struct PagePort {
 
 impl Port for PagePort {
     fn publish(&self, publication: Publication) {
-        self.site.board.write(publication.clone());
+        // those are the mesh and the features again, drawn for RViz
+        if !matches!(publication, Publication::Tile(_) | Publication::FeatureMarkers(_)) {
+            self.site.board.write(publication.clone());
+        }
         self.network.publish(publication);
     }
 
