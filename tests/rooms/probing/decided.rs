@@ -88,7 +88,7 @@ fn explored(
     let plate = Plate::default();
     let mut some = |most: f64| rng.random_range(-most..most);
     let flag = case.flag + Vector3::new(some(1e-3), some(1e-3), 0.0);
-    let scan = flat([-100.0, 200.0], [-100.0, 200.0]);
+    let scan = flat([-10.0, 70.0], [-10.0, 60.0]);
     let explorer = Explorer::new(Some(case.kind), &flag, &Vector3::z_axis(), params, &scan).unwrap();
     let mut explorer = match goal {
         Some(goal) => explorer.until_decided(goal),
