@@ -277,6 +277,7 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
 #[test]
 fn looking_after_each_touch_keeps_the_stated_risk() {
     let seeds = either(60, 500);
+    let confidence = touchup::conformity::repeated_confidence(0.95, 6, 39);
     for case in [HOLE, PLANE] {
         let limits = limits(&case, 1.0);
         let [mut naive, mut kept] = [[0usize; 2]; 2];
@@ -287,7 +288,6 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
             let mut look = |explorer: &Explorer| {
                 let standing = explorer.characteristics();
                 let Some(number) = standing[0].measured else { return };
-                let confidence = touchup::conformity::repeated_confidence(0.95, 6, 39);
                 let rules = [0.95, confidence].map(|confidence| DecisionParams { confidence, ..Default::default() });
                 for (rule, first) in rules.iter().zip(&mut first) {
                     let said = assess(&number, limits, touchup::conformity::Distribution::Normal, rule).decision;

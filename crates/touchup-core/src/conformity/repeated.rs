@@ -11,8 +11,8 @@
 
 use crate::numeric::{normal_cdf, normal_quantile};
 
-/// Step of the density, in standard deviations: a fifth of that of one step of Z at the most.
-const STEP: f64 = 0.02;
+/// Step of the density, in standard deviations: two fifths of that of one step of Z at the most.
+const STEP: f64 = 0.05;
 /// The density is followed down to here.
 const LOWEST: f64 = -6.0;
 /// Of many touches one look in so many steps of a doubling stands for those beside it.
