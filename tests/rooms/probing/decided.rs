@@ -135,7 +135,7 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
     let off = RADIUS * rng.sample::<f64, _>(StandardNormal);
     let places = |at: usize| {
         let (turn, depth) =
-            (at as f64 / GRID as f64 * std::f64::consts::TAU, if at % 2 == 0 { 1.2e-3 } else { 2.8e-3 });
+            (at as f64 / GRID as f64 * std::f64::consts::TAU, if at.is_multiple_of(2) { 1.2e-3 } else { 2.8e-3 });
         (turn, depth)
     };
     let mut noise = || SIGMA.hypot(TOUCH) * rng.sample::<f64, _>(StandardNormal);
