@@ -8,10 +8,11 @@ use nalgebra::Point3;
 use serde::Serialize;
 
 use super::arm::{ArmArguments, RobotName};
-use super::probing::{Done, Probing, Ready, flag_of, millimetres};
+use super::probing::{Done, Probing, Ready, flag_of, goals_of, millimetres};
 use super::signals::StopSignals;
 use super::told::ToldNumbers;
 use super::{CliError, Losses, counted, print_report, reported, require, require_positive};
+use crate::conformity::DecisionParams;
 use crate::probing::arm::{Arm, Narrower};
 use crate::probing::execute::{Flag, HeldBack, Plan, PlannedMotion};
 
@@ -31,6 +32,15 @@ pub(super) struct ProbeArguments {
     /// Target half width of the confidence interval of each dimension, at the confidence of the scene, mm
     #[arg(long, value_name = "T")]
     tolerance_mm: Option<f64>,
+    /// Touches until each characteristic of a drawing passes or fails, in place of until a dimension has a tolerance
+    #[arg(long, value_name = "GOAL", value_parser = ["decided"], requires = "nominal", conflicts_with = "tolerance_mm")]
+    until: Option<String>,
+    /// The drawing of --until decided: nominal values and tolerances, CSV or JSON (docs/inspect.md)
+    #[arg(long, value_name = "FILE", requires = "until")]
+    nominal: Option<PathBuf>,
+    /// Probability of conformity that a pass needs, and of nonconformity that a fail needs; of all looks together
+    #[arg(long, value_name = "P", default_value_t = 0.95, requires = "until")]
+    confidence: f64,
     /// Most touches of a feature
     #[arg(long, value_name = "N")]
     max_touches: Option<usize>,
@@ -81,7 +91,7 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
         out: &arguments.out,
     };
     let mut ready = probing.ready()?;
-    arguments.narrow(&mut ready)?;
+    arguments.narrow(&mut ready, &flags)?;
     if arguments.dry_run || !ready.is_motion_allowed() {
         return arguments.plan_alone(&probing, &ready);
     }
@@ -100,7 +110,7 @@ impl ProbeArguments {
     }
 
     /// A request can ask for less than the scene allows.
-    fn narrow(&self, ready: &mut Ready) -> Result<(), CliError> {
+    fn narrow(&self, ready: &mut Ready, flags: &[Flag]) -> Result<(), CliError> {
         if let Some(temperature_c) = self.temperature_c {
             ready.at_temperature(temperature_c)?;
         }
@@ -118,6 +128,12 @@ impl ProbeArguments {
         if let Some(tolerance_mm) = self.tolerance_mm {
             require_positive("--tolerance-mm", tolerance_mm)?;
             params.pattern.sigma *= tolerance_mm / wanted_mm;
+        }
+        if let Some(nominal) = &self.nominal {
+            let is_more_than_even = self.confidence > 0.5 && self.confidence < 1.0;
+            require(is_more_than_even, format_args!("--confidence {} must be above 0.5 and below 1", self.confidence))?;
+            let rule = DecisionParams { confidence: self.confidence, ..DecisionParams::default() };
+            ready.params.goals = goals_of(nominal, flags, &ready.static_world()?, rule)?;
         }
         Ok(())
     }
@@ -137,7 +153,8 @@ impl ProbeArguments {
         if !self.dry_run {
             return ready.may_move().map(|()| Losses::new());
         }
-        let report = DryRunReport::of(&ready.told, probing.flags, &plans, [x, y, z], self.out.join("plan.png"));
+        let picture = self.out.join("plan.png");
+        let report = DryRunReport::of(&ready.told, probing.flags, &plans, [x, y, z], self.nominal.is_some(), picture);
         print_report(self.json, &report, || report.to_string())?;
         Ok(Losses::new())
     }
@@ -163,15 +180,21 @@ impl ProbeArguments {
     }
 }
 
+/// A decision depends on what is measured.
+const AS_SCANNED: &str =
+    "the part is as the scan has it: a value nearer to its limits takes more touches until it is decided";
+
 reported! {
     /// What `--dry-run --json` prints.
-    struct DryRunReport, fn of(numbers: &ToldNumbers, flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], drawn: PathBuf) {
+    struct DryRunReport, fn of(numbers: &ToldNumbers, flags: &[Flag], plans: &[Plan], start_mm: [f64; 3], decides: bool, drawn: PathBuf) {
         /// what was told of tip and scan, and by what
         told: ToldNumbers = numbers.clone(),
         /// centre of the ball where the plan begins, in the frame of the scan
         from_mm: [f64; 3] = start_mm,
         features: Vec<PlannedFeature> =
             flags.iter().zip(plans).map(|(flag, plan)| PlannedFeature::of(flag.id, plan)).collect(),
+        /// what the plan takes for granted
+        assumes?: &'static str = decides.then_some(AS_SCANNED),
         picture: PathBuf = drawn,
     }
 }
@@ -224,6 +247,7 @@ impl fmt::Display for DryRunReport {
         let [x, y, z] = self.from_mm;
         writeln!(f, "planned from ({x:.1} {y:.1} {z:.1}) mm by the scene alone, without asking an arm where it is")?;
         writeln!(f, "{}", self.told)?;
+        self.assumes.iter().try_for_each(|assumes| writeln!(f, "assumed: {assumes}"))?;
         for one in &self.features {
             write!(f, "feature {}: {}", one.flag, counted(one.touches, "touch", "touches"))?;
             if one.slides > 0 {
@@ -268,7 +292,9 @@ mod tests {
         assert_eq!(numbers(&planned.unreachable_slides), [(0, "reason 2".to_owned())]);
         let told = ToldNumbers::of(&Scene::default(), "", [None; 3]);
         let features = vec![planned];
-        let text = DryRunReport { told, from_mm: [0.0; 3], features, picture: PathBuf::from("plan.png") }.to_string();
+        let text =
+            DryRunReport { told, from_mm: [0.0; 3], features, assumes: None, picture: PathBuf::from("plan.png") }
+                .to_string();
         assert!(text.starts_with("1 of 2 planned touches can be made; nothing moved\n"), "{text}");
         assert!(text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"), "{text}");
     }

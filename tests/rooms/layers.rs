@@ -19,7 +19,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("reconstruct", "numeric parameters stylus mesh"),
     ("haptic", "numeric parameters stylus mesh reconstruct"),
     ("live", "clock stylus mesh reconstruct haptic"),
-    ("plan", "numeric parameters stylus mesh features"),
+    ("plan", "numeric parameters stylus mesh features conformity"),
     ("arm", "numeric parameters stylus plan"),
     ("execute", "numeric parameters stylus mesh features calibrate plan arm"),
     ("sim", "numeric stylus mesh calibrate diagnose arm"),

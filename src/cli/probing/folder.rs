@@ -52,6 +52,9 @@ struct ProbingSettings {
     touch_sigma_mm: f64,
     #[serde(default)]
     growth_mm_per_m: f64,
+    /// characteristics that are to be decided, in words
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    until_decided: Vec<String>,
 }
 
 impl ProbingRequest {
@@ -80,6 +83,7 @@ impl ProbingRequest {
             slides: params.slides,
             touch_sigma_mm: params.pattern.touch_sigma * 1e3,
             growth_mm_per_m: params.pattern.shared.growth * 1e3,
+            until_decided: params.goals.iter().map(|(flag, goal)| format!("{flag}: {goal:?}")).collect(),
         };
         let flags = flags.iter().map(flag_record).collect();
         Ok(Self { scene, scene_crc32, scan, scan_crc32, mesh_unit, is_simulated, flags, settings })
@@ -92,7 +96,10 @@ impl ProbingRequest {
             (self.scene_crc32 != before.scene_crc32, "the scene"),
             ((self.scan_crc32, self.mesh_unit) != (before.scan_crc32, before.mesh_unit), "the scan or its unit"),
             (self.flags != before.flags, "the list of features"),
-            (self.settings != before.settings, "tolerance, touches, force, time, slides or the check of the arm"),
+            (
+                self.settings != before.settings,
+                "tolerance, nominal values, touches, force, time, slides or the check of the arm",
+            ),
         ];
         differences.into_iter().find_map(|(differs, what)| differs.then_some(what))
     }

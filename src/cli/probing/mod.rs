@@ -4,6 +4,7 @@
 mod files;
 mod folder;
 mod follower;
+mod goals;
 mod picture;
 mod ready;
 mod report;
@@ -24,6 +25,7 @@ use crate::probing::arm::{Arm, ArmState};
 use crate::probing::execute::{Ending, Flag, Plan, Probed, Prober, plan};
 use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};
+pub(super) use goals::goals_of;
 use picture::{draw_plan, draw_touches};
 pub(super) use ready::{Ready, check_temperature};
 pub(super) use report::ProbingSummary;

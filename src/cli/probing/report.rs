@@ -8,10 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::cli::refine::RefineSummary;
 use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
+use crate::conformity::Decision;
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::probing::arm::SlideRecord;
 use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch};
+use crate::probing::plan::DecidedCharacteristic;
 use crate::scene::{CheckRecord, CheckStanding};
 
 reported! {
@@ -22,8 +24,8 @@ reported! {
         kind: String = kind_of(flagged).to_owned(),
         flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
         search_radius_mm: f64 = flagged.radius * 1e3,
-        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
-        /// `no_clear_path`, `stopped`
+        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `decided`, `undecided`, `undecidable`, `time_spent`,
+        /// `nothing_found`, `cancelled`, `out_of_limits`, `no_clear_path`, `stopped`
         code: String = code(&probed.ending).to_owned(),
         /// the same in words
         ending: String = probed.ending.to_string(),
@@ -49,7 +51,68 @@ reported! {
             .as_ref()
             .and_then(|found| found.by_touches.as_ref())
             .map_or_else(BTreeMap::new, |feature| FeatureRecord::of(feature).std),
+        /// of `--until decided`
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        characteristics: Vec<ProbedCharacteristic> = probed
+            .found
+            .iter()
+            .flat_map(|found| &found.characteristics)
+            .map(ProbedCharacteristic::of)
+            .collect(),
         feature?: FeatureRecord = probed.found.as_ref().and_then(|found| found.feature.as_ref()).map(FeatureRecord::of),
+    }
+}
+
+/// Coverage factor of expanded uncertainties.
+const COVERAGE: f64 = 2.0;
+
+reported! {
+    /// A characteristic that was to be decided.
+    #[derive(Clone, Deserialize)]
+    struct ProbedCharacteristic, fn of(one: &DecidedCharacteristic) {
+        name: String = one.sought.name.clone(),
+        quantity: String = one.sought.quantity.name().to_owned(),
+        /// `pass`, `fail` or `undecided`
+        decision: String = one.assessment.decision.name().to_owned(),
+        /// why it is undecided
+        reason?: String = why_open(one),
+        value_mm?: f64 = one.measured.map(|number| number.value * 1e3),
+        /// U, with a coverage factor of 2
+        expanded_uncertainty_mm?: f64 = one.measured.and_then(|number| number.std).map(|std| std * COVERAGE * 1e3),
+        /// the part of the standard uncertainty that all touches have in common
+        shared_uncertainty_mm: f64 = one.shared * 1e3,
+        lower_limit_mm?: f64 = one.sought.limits.lower.map(|limit| limit * 1e3),
+        upper_limit_mm?: f64 = one.sought.limits.upper.map(|limit| limit * 1e3),
+        conformance_probability?: f64 = one.assessment.conformance_probability,
+    }
+}
+
+fn why_open(one: &DecidedCharacteristic) -> Option<String> {
+    let is_undecided = one.assessment.decision == Decision::Undecided;
+    let why = match one.measured {
+        None => "its touches do not fix it",
+        Some(_) if one.is_limited => {
+            "no touch decides it: what all touches have in common leaves it open, or they do not fix it"
+        }
+        Some(_) => "more touches could decide it",
+    };
+    is_undecided.then(|| why.to_owned())
+}
+
+impl fmt::Display for ProbedCharacteristic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.name, self.decision)?;
+        if let Some(value) = self.value_mm {
+            write!(f, ": {value:.3} mm")?;
+        }
+        self.expanded_uncertainty_mm.iter().try_for_each(|expanded| write!(f, " ± {expanded:.3} mm (k = 2)"))?;
+        match (self.lower_limit_mm, self.upper_limit_mm) {
+            (Some(lower), Some(upper)) => write!(f, ", limits {lower:.3} to {upper:.3} mm")?,
+            (Some(lower), None) => write!(f, ", at least {lower:.3} mm")?,
+            (None, Some(upper)) => write!(f, ", at most {upper:.3} mm")?,
+            (None, None) => {}
+        }
+        self.reason.iter().try_for_each(|reason| write!(f, "; {reason}"))
     }
 }
 
@@ -80,7 +143,14 @@ impl ProbedRecord {
     pub(super) fn is_finished(&self) -> bool {
         matches!(
             self.code.as_str(),
-            "tolerance_reached" | "touches_spent" | "calibration_limits" | "time_spent" | "nothing_found"
+            "tolerance_reached"
+                | "touches_spent"
+                | "calibration_limits"
+                | "decided"
+                | "undecided"
+                | "undecidable"
+                | "time_spent"
+                | "nothing_found"
         )
     }
 
@@ -91,8 +161,14 @@ impl ProbedRecord {
 
     /// Why it is not as it was asked for, where that is so.
     pub(super) fn loss(&self) -> Option<String> {
+        let failed: Vec<_> = self.characteristics.iter().filter(|one| one.decision == Decision::Fail.name()).collect();
+        if !failed.is_empty() {
+            let failed = failed.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+            let ending = if self.code == "decided" { String::new() } else { format!("; {}", self.ending) };
+            return Some(format!("feature {}: {failed}{ending}", self.flag));
+        }
         let is_as_asked = match self.code.as_str() {
-            "tolerance_reached" => true,
+            "tolerance_reached" | "decided" => true,
             "touches_spent" => self.kind == UNKNOWN,
             _ => false,
         };
@@ -168,6 +244,9 @@ fn code(ending: &Ending) -> &'static str {
         Ending::ToleranceReached => "tolerance_reached",
         Ending::TouchesSpent => "touches_spent",
         Ending::CalibrationLimits { .. } => "calibration_limits",
+        Ending::Decided => "decided",
+        Ending::Undecided { .. } => "undecided",
+        Ending::Undecidable { .. } => "undecidable",
         Ending::TimeSpent => "time_spent",
         Ending::NothingFound(_) => "nothing_found",
         Ending::Cancelled(_) => "cancelled",
@@ -179,12 +258,18 @@ fn code(ending: &Ending) -> &'static str {
 
 impl fmt::Display for ProbingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let reached = self.features.iter().filter(|record| record.code == code(&Ending::ToleranceReached)).count();
-        writeln!(f, "tolerance reached: {reached} of {}", counted(self.features.len(), "feature", "features"))?;
+        let count = |wanted: Ending| self.features.iter().filter(|record| record.code == code(&wanted)).count();
+        let features = counted(self.features.len(), "feature", "features");
+        if self.features.iter().any(|record| !record.characteristics.is_empty()) {
+            writeln!(f, "decided: {} of {features}", count(Ending::Decided))?;
+        } else {
+            writeln!(f, "tolerance reached: {} of {features}", count(Ending::ToleranceReached))?;
+        }
         for record in &self.features {
             let ProbedRecord { flag, kind, touches, duration_s, largest_force_n, ending, .. } = record;
             write!(f, "{kind} {flag}: {ending}")?;
             record.feature.iter().try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
+            record.characteristics.iter().try_for_each(|one| write!(f, "\n  {one}"))?;
             let touches = counted(*touches, "touch", "touches");
             write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
             by_reason(&record.rejected_touches).iter().try_for_each(|line| write!(f, "\n  {line}"))?;

@@ -23,7 +23,8 @@ fn probed(simulated: &ArmParams, arm: &mut dyn Arm) -> [f64; 3] {
     let highest = Point3::from(middle + Vector3::new(0.2, 0.23, 0.35));
     let limits = Limits { lowest, highest, ..Limits::default() };
     let pattern = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
-    let params = ProbeParams { touch: TouchParams::default(), pattern, slides: false, limits };
+    let params =
+        ProbeParams { touch: TouchParams::default(), pattern, goals: Default::default(), slides: false, limits };
     let probed = Prober::new(arm, &cell, &params, &mut StaticScan::new(plate_scan(1))).probe(&HOLE);
     assert_eq!(probed.ending, Ending::ToleranceReached, "{:?}", probed.touches.len());
     let hole = probed.found.as_ref().unwrap().feature.as_ref().unwrap();

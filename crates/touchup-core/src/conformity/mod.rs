@@ -12,13 +12,17 @@
 mod assess;
 mod general;
 mod matching;
+mod of_feature;
 mod place;
 mod probability;
 mod quantity;
+mod repeated;
 
 pub use assess::{Assessment, Decision, DecisionParams, DecisionRule, MeasuredNumber, OpenReason, assess};
 pub use general::GeneralTolerance;
 pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
+pub use of_feature::measured_number;
 pub use place::{coordinate_std, position};
 pub use probability::{Distribution, ToleranceLimits, conformance_probability};
 pub use quantity::InspectedQuantity;
+pub use repeated::repeated_confidence;

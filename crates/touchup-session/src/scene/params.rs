@@ -1,5 +1,7 @@
 //! Sections of the YAML turned into the settings of the modules.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
 
 use super::sections::{NO_TURN, unit_quaternion};
@@ -52,7 +54,7 @@ impl Scene {
         };
         let sigma = sigma_of(robot.tolerance, robot.confidence);
         let pattern = PatternParams { ball_radius, sigma, ..robot.checked_pattern() };
-        Some((cell, ProbeParams { touch, pattern, slides: false, limits: limits.clone() }))
+        Some((cell, ProbeParams { touch, pattern, goals: BTreeMap::new(), slides: false, limits: limits.clone() }))
     }
 
     /// The filter that makes poses of markers, if there is one.

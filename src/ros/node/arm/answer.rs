@@ -149,9 +149,12 @@ fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
 
 fn code_of(ending: &Ending) -> u8 {
     match ending {
-        Ending::ToleranceReached => ProbeResult::TOLERANCE_REACHED,
+        Ending::ToleranceReached | Ending::Decided => ProbeResult::TOLERANCE_REACHED,
         // as good as touches can make it; the message has the reason
-        Ending::TouchesSpent | Ending::CalibrationLimits { .. } => ProbeResult::TOUCHES_SPENT,
+        Ending::TouchesSpent
+        | Ending::CalibrationLimits { .. }
+        | Ending::Undecided { .. }
+        | Ending::Undecidable { .. } => ProbeResult::TOUCHES_SPENT,
         Ending::TimeSpent => ProbeResult::TIME_SPENT,
         Ending::NothingFound(_) => ProbeResult::NOTHING_FOUND,
         Ending::Cancelled(request) => cancelled(*request),

@@ -640,3 +640,55 @@ fn an_undetermined_payload_is_refused_and_nothing_is_written() {
         assert!(stderr(&done).contains(part), "{more:?}: {}", stderr(&done));
     }
 }
+
+/// A nominal file of one line for each characteristic of the hole.
+fn nominal_file(folder: &Path, lines: &[&str]) -> String {
+    let head = "name,kind,quantity,nominal_mm,tolerance_mm,center_x_mm,center_y_mm,center_z_mm";
+    let path = folder.join("nominal.csv");
+    fs::write(&path, format!("{head}\n{}\n", lines.join("\n"))).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// The hole is 8 mm wide: far within one tolerance, far outside of another.
+#[test]
+fn a_probing_until_decided_ends_with_the_decision_of_each_characteristic() {
+    for (nominal, code, said) in [("8,0.1", 0, "pass"), ("8.3,0.1", 4, "fail")] {
+        let folder = tempfile::tempdir().unwrap();
+        let drawing = nominal_file(folder.path(), &[&format!("bore,hole,diameter_mm,{nominal},16,36,12")]);
+        let until = ["--feature", "hole@17,35,12", "--until", "decided", "--nominal", &drawing];
+        let done = probe(folder.path(), |scene| scene, &until);
+        assert_eq!(done.status.code(), Some(code), "{}", stderr(&done));
+        let probed: Value = serde_json::from_slice(&fs::read(folder.path().join("out/probed.json")).unwrap()).unwrap();
+        let hole = &probed["features"][0];
+        assert_eq!(hole["code"], "decided");
+        let bore = &hole["characteristics"][0];
+        assert_eq!((bore["name"].as_str(), bore["decision"].as_str()), (Some("bore"), Some(said)), "{bore}");
+        assert!((bore["value_mm"].as_f64().unwrap() - 8.0).abs() < 0.03, "{bore}");
+        assert!(hole["touches"].as_u64().unwrap() < 25, "{hole}");
+        assert_eq!(stderr(&done).contains("bore: fail"), code == 4, "{}", stderr(&done));
+    }
+}
+
+#[test]
+fn a_goal_that_cannot_be_decided_is_refused_with_its_reason() {
+    let refused = |lines: &[&str], more: &[&str], code: i32, why: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let drawing = nominal_file(folder.path(), lines);
+        let until = ["--feature", "hole@17,35,12", "--until", "decided", "--nominal", &drawing];
+        let done = probe(folder.path(), |scene| scene, &[&until[..], more].concat());
+        assert_eq!(done.status.code(), Some(code), "{}", stderr(&done));
+        assert!(why.iter().all(|why| stderr(&done).contains(why)), "{}", stderr(&done));
+    };
+    let bore = "bore,hole,diameter_mm,8,0.1,16,36,12";
+    let round = "round,hole,roundness_mm,,0.1,16,36,12";
+    refused(&[bore], &["--tolerance-mm", "0.1"], 2, &["--tolerance-mm"]);
+    refused(&[bore], &["--confidence", "0.4"], 2, &["--confidence 0.4"]);
+    refused(&[bore, round], &[], 3, &["round (roundness_mm)", "touchup inspect"]);
+    refused(
+        &["bore,hole,diameter_mm,8,0.1,46,36,12"],
+        &[],
+        3,
+        &["no characteristic of a hole within 3.0 mm of feature 1"],
+    );
+    refused(&["bore,hole,diameter_mm,8,,16,36,12"], &[], 3, &["bore has no tolerance"]);
+}

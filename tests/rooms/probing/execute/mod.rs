@@ -22,5 +22,5 @@ fn params() -> ProbeParams {
     let limits =
         Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() };
     let pattern = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
-    ProbeParams { touch: TouchParams::default(), pattern, slides: false, limits }
+    ProbeParams { touch: TouchParams::default(), pattern, goals: Default::default(), slides: false, limits }
 }

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::links::LinkError;
 use crate::probing::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
-use crate::probing::plan::{ExploreError, Found, Slide, TouchPlan};
+use crate::probing::plan::{DecidedCharacteristic, ExploreError, Found, Slide, TouchPlan};
 
 /// How it ended; as an error, why it ended before all was done.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -25,6 +25,26 @@ pub enum Ending {
     CalibrationLimits {
         /// standard uncertainty over the requested one
         over: f64,
+    },
+    /// Each characteristic passes or fails.
+    #[error("decided")]
+    Decided,
+    /// The touches are spent before that.
+    #[error(
+        "undecided: the touches are spent, and {names} may still pass or fail: allow more touches, or agree on other limits"
+    )]
+    Undecided {
+        /// of what is open
+        names: String,
+    },
+    /// More touches would not help.
+    #[error(
+        "undecided: what radius of the ball, place of the part and kinematics leave uncertain is in all touches alike, and leaves {names} \
+         open however often it is touched: calibrate them, or agree on other limits"
+    )]
+    Undecidable {
+        /// of what is open
+        names: String,
     },
     /// The time is spent.
     #[error("tolerance not reached: the time is spent")]
@@ -56,6 +76,20 @@ impl From<ProbeError> for Ending {
 }
 
 impl Ending {
+    /// Where a decision was the goal.
+    pub(super) fn of_decisions(characteristics: &[DecidedCharacteristic]) -> Self {
+        let names = |is_it: fn(&DecidedCharacteristic) -> bool| {
+            let named = characteristics.iter().filter(|one| is_it(one)).map(|one| one.sought.name.as_str());
+            named.collect::<Vec<_>>().join(", ")
+        };
+        let (open, limited) = (names(DecidedCharacteristic::is_open), names(|one| one.is_limited));
+        match (open.is_empty(), limited.is_empty()) {
+            (true, true) => Self::Decided,
+            (true, false) => Self::Undecidable { names: limited },
+            (false, _) => Self::Undecided { names: open },
+        }
+    }
+
     /// The reason alone.
     pub(super) fn why(&self) -> String {
         self.source().map_or_else(|| self.to_string(), ToString::to_string)

@@ -59,6 +59,7 @@ impl<'a> Prober<'a> {
         let found = explorer.found();
         let ending = match (ended, &found) {
             (Err(ending), _) => ending,
+            (Ok(()), Ok(found)) if !found.characteristics.is_empty() => Ending::of_decisions(&found.characteristics),
             (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
             (Ok(()), Ok(found)) => {
                 found.limited.map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits { over })

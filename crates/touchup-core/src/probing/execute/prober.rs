@@ -1,5 +1,7 @@
 //! What is probed, how, and by what.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Point3, UnitQuaternion};
 
 use super::cell::Cell;
@@ -9,7 +11,7 @@ use super::route::FreeSpace;
 use super::world::{World, distance, normal_about, on_mesh};
 use crate::features::Kind;
 use crate::probing::arm::{Arm, ArmState, LimitError, Limits, Narrower, ProbeError, TouchParams, Watched};
-use crate::probing::plan::{ExploreError, Explorer, PatternParams};
+use crate::probing::plan::{DecisionGoal, ExploreError, Explorer, PatternParams};
 
 /// A place to probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +33,8 @@ pub struct ProbeParams {
     pub touch: TouchParams,
     /// what is wanted of a feature; the radius around a flag is the flag's
     pub pattern: PatternParams,
+    /// what ends the probing of a feature, in place of an uncertainty: by the numbers of their flags
+    pub goals: BTreeMap<u32, DecisionGoal>,
     /// whether the ball slides over all of what its touches have found
     pub slides: bool,
     /// what must never be left
@@ -74,6 +78,10 @@ impl Flag {
         let normal = normal_about(world, &place, &cell.shaft(&now.pose_bt.rotation));
         let pattern = PatternParams { flag_radius: self.radius, ..params.pattern };
         let explorer = Explorer::new(self.kind, &place, &normal, pattern, world.mesh())?;
+        let explorer = match params.goals.get(&self.id) {
+            Some(goal) => explorer.until_decided(goal.clone()),
+            None => explorer,
+        };
         Ok((explorer, cell.upright(&now.pose_bt.rotation, &normal)))
     }
 }

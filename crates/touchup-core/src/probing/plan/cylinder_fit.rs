@@ -8,7 +8,7 @@ use super::design::{Asked, Knowledge};
 use super::error::ExploreError;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::Touched;
-use super::search_context::{Quantity, SearchContext, TouchPlan, toward};
+use super::search_context::{OpenNumbers, Quantity, SearchContext, TouchPlan, toward};
 use super::slide::{RimStation, Slide};
 use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, Surface, fit};
 use crate::numeric::{NormalEquations, mean};
@@ -88,6 +88,11 @@ impl RoundWall {
         let asked = Asked::default();
         let (lean, fit) = squareness(context.square(context.lean), guess, &self.measuring.observations, &LEAN);
         let asked = match context.params.quantity {
+            _ if context.open.is_some_and(|open| open != OpenNumbers::default()) => {
+                let OpenNumbers { place, size, .. } = context.open.unwrap_or_default();
+                let asked = place.map_or(asked.clone(), |sigma| asked.each(&[Freedom::X, Freedom::Y], sigma));
+                size.map_or(asked.clone(), |sigma| asked.and(&[(Freedom::Size, 2.0)], sigma))
+            }
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
             Quantity::Diameter => asked.and(&[(Freedom::Size, 2.0)], sigma),

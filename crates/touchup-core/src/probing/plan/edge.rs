@@ -314,8 +314,12 @@ impl Stage for EdgePattern {
     }
 
     fn is_known(&self, context: &SearchContext) -> bool {
+        self.is_fixed(context) && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+    }
+
+    fn is_fixed(&self, context: &SearchContext) -> bool {
         let is_enough = self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
-        is_enough && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+        is_enough && self.uncertainty(context).is_some()
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
+use super::decision::{DecidedCharacteristic, DecisionGoal, open_numbers};
 use super::error::ExploreError;
 use super::level::UNTOUCHED;
 use super::outline::Outline;
@@ -12,6 +13,7 @@ use super::search::{DEEPEST, ROUGH};
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use super::slide::Slide;
 use super::{boss, edge, hole, plane, region, slot};
+use crate::conformity::{Decision, DecisionParams};
 use crate::features::fit::Observation;
 use crate::features::{Feature, Kind};
 use crate::mesh::TriMesh;
@@ -34,6 +36,8 @@ pub struct Found {
     pub limited: Option<f64>,
     /// the feature with the uncertainties that come from the scatter of its touches alone
     pub by_touches: Option<Feature>,
+    /// each characteristic that was to be decided, where that was the goal
+    pub characteristics: Vec<DecidedCharacteristic>,
 }
 
 /// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch, [`Explorer::take`] takes its
@@ -49,6 +53,8 @@ pub struct Explorer {
     wanted: f64,
     /// m or rad
     shared: f64,
+    /// what is to be decided, and the rule of one look
+    goal: Option<(DecisionGoal, DecisionParams)>,
 }
 
 /// Where what touches leave is this share of what all of them have in common, more touches add a twentieth at most.
@@ -93,8 +99,37 @@ impl Explorer {
         let deep = params.depth.max(DEEPEST * params.ball_radius) + ROUGH;
         let outline = Arc::new(Outline::new(scan, flag, normal, deep));
         let (lean, left_out) = (UNTOUCHED, Vec::new());
-        let context = SearchContext { params, pose_of, lean, height: 0.0, touches: 0, outline, left_out };
-        Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared })
+        let open = None;
+        let context = SearchContext { params, pose_of, lean, height: 0.0, touches: 0, open, outline, left_out };
+        Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared, goal: None })
+    }
+
+    /// Touches until each characteristic of the feature is decided, in place of until a number has an uncertainty.
+    pub fn until_decided(mut self, goal: DecisionGoal) -> Self {
+        let of_one_look = goal.of_one_look(self.context.params.budget);
+        self.context.params.quantity = super::search_context::Quantity::All;
+        self.goal = Some((goal, of_one_look));
+        self
+    }
+
+    /// What the touches so far say of each characteristic that is to be decided.
+    pub fn characteristics(&self) -> Vec<DecidedCharacteristic> {
+        let Some((goal, params)) = &self.goal else { return Vec::new() };
+        // the shape is fixed where each of its numbers is
+        let of_all = SearchContext { open: None, ..self.context.clone() };
+        let is_fixed = self.stage.is_fixed(&of_all);
+        let by_touches = if is_fixed { self.stage.feature(&of_all).ok().flatten() } else { None };
+        let feature = by_touches.clone().map(|feature| self.context.params.shared.widened(feature));
+        goal.standing(params, feature.as_ref().zip(by_touches.as_ref()))
+    }
+
+    /// Whether nothing is left that touches are made for.
+    fn is_done(&mut self) -> bool {
+        let Some((_, params)) = self.goal.as_ref() else { return self.stage.is_known(&self.context) };
+        let standing = self.characteristics();
+        let is_measured = standing.iter().any(|one| one.measured.is_some());
+        self.context.open = is_measured.then(|| open_numbers(&standing, params));
+        !standing.iter().any(DecidedCharacteristic::is_open)
     }
 
     /// Touches so far.
@@ -109,7 +144,9 @@ impl Explorer {
 
     /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
     pub fn uncertainty(&self) -> Option<f64> {
-        self.stage.uncertainty(&self.context).map(|sigma| sigma.hypot(self.shared))
+        // also where a decision asks for less
+        let of_all = SearchContext { open: None, ..self.context.clone() };
+        self.stage.uncertainty(&of_all).map(|sigma| sigma.hypot(self.shared))
     }
 
     /// The next planned touch; `None` when it is done, or cannot be ([`Self::found`] says which).
@@ -119,7 +156,7 @@ impl Explorer {
             return None;
         }
         while self.asked.is_none() && self.ended.is_none() {
-            let is_known = self.stage.is_known(&self.context);
+            let is_known = self.is_done();
             match if is_known { Ok(None) } else { self.stage.next(&mut self.context) } {
                 Ok(Some(planned)) if self.context.is_beside(&planned) => self.leave_out(planned),
                 Ok(Some(planned)) => self.asked = Some(planned),
@@ -170,8 +207,11 @@ impl Explorer {
             // the last touch that may be made was enough
             None => self.context.touches >= self.context.params.budget && self.stage.is_known(&self.context),
         };
+        let characteristics = self.characteristics();
+        let is_decided = characteristics.iter().all(|one| one.assessment.decision != Decision::Undecided);
+        let is_as_asked = if self.goal.is_some() { is_decided } else { is_as_asked };
         let over = self.uncertainty().map(|sigma| sigma / self.wanted);
-        let limited = over.filter(|over| is_as_asked && *over > 1.0 + ROUNDING);
+        let limited = over.filter(|over| self.goal.is_none() && is_as_asked && *over > 1.0 + ROUNDING);
         let by_touches = self.stage.feature(&self.context)?;
         let place = by_touches.as_ref().map(|feature| feature.centre.value);
         let (params, out) = (&self.context.params, self.context.out());
@@ -183,6 +223,7 @@ impl Explorer {
             uncertainty: self.uncertainty(),
             shared: place.map_or(self.shared, |place| params.shared_part(self.kind, &place, &out)),
             by_touches,
+            characteristics,
         })
     }
 }

@@ -8,6 +8,7 @@ mod advice;
 mod arm_uncertainty;
 mod boss;
 mod cylinder_fit;
+mod decision;
 mod design;
 mod edge;
 mod error;
@@ -28,6 +29,7 @@ mod tolerance;
 
 pub use advice::{NextTouch, advise_next_touch};
 pub use arm_uncertainty::ArmUncertainty;
+pub use decision::{DecidedCharacteristic, DecisionGoal, SoughtCharacteristic};
 pub use design::{Asked, Candidate, Knowledge};
 pub use error::ExploreError;
 pub use explorer::{Explorer, Found};

@@ -41,6 +41,10 @@ pub(super) trait Stage: Debug + Send {
     fn is_known(&self, context: &SearchContext) -> bool {
         self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
     }
+    /// Whether its touches fix its shape, so that its numbers can be believed.
+    fn is_fixed(&self, context: &SearchContext) -> bool {
+        self.uncertainty(context).is_some()
+    }
     /// Paths to slide over it, once there is a feature.
     fn slides(&self, context: &SearchContext) -> Vec<Slide>;
 }

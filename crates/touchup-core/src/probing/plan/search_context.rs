@@ -154,6 +154,17 @@ pub enum TouchResult {
     Unclear,
 }
 
+/// What is asked of the numbers of a feature where a decision is the goal: the standard deviation of each that is open, m; `None`: nothing
+/// is asked of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct OpenNumbers {
+    /// of the place, along each axis
+    pub place: Option<f64>,
+    /// of the diameter or width
+    pub size: Option<f64>,
+    pub length: Option<f64>,
+}
+
 /// State of the search for a feature.
 #[derive(Clone, Debug)]
 pub(super) struct SearchContext {
@@ -165,6 +176,8 @@ pub(super) struct SearchContext {
     /// of the surface in F
     pub height: f64,
     pub touches: usize,
+    /// what touches are chosen for in place of the wanted number, once a decision is the goal and the shape is known
+    pub open: Option<OpenNumbers>,
     /// of the scan, seen along the normal at the flag
     pub outline: Arc<Outline>,
     /// places of the surface, in O, that were not touched, for the scan has no part there

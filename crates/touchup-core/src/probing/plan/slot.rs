@@ -20,7 +20,9 @@ use super::hole::numbers;
 use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::{Stage, Touched};
 use super::search::{BELOW_RIM, BESIDE, CHAMFER, OpeningSearch, REACH, ROUGH, SHALLOW};
-use super::search_context::{AROUND, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward};
+use super::search_context::{
+    AROUND, OpenNumbers, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult, toward,
+};
 use super::slide::{RimStation, Slide, stadium_rim};
 use super::slot_fit::{CORNER, SlotFit};
 use crate::features::fit::{Ends, FitParams, Freedom, Observation, Stadium, Surface, fit};
@@ -135,6 +137,12 @@ impl SlotPattern {
         let (sigma, (lean, fit)) = (params.sigma, self.squareness(context, walls));
         let asked = Asked::default();
         let asked = match params.quantity {
+            _ if context.open.is_some_and(|open| open != OpenNumbers::default()) => {
+                let OpenNumbers { place, size, length } = context.open.unwrap_or_default();
+                let asked = place.map_or(asked.clone(), |sigma| asked.each(&[Freedom::X, Freedom::Y], sigma));
+                let asked = size.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Size], sigma));
+                length.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Second], sigma))
+            }
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
             Quantity::Length => asked.each(&[Freedom::Second], sigma),
