@@ -7,7 +7,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::CliError;
-use crate::scene::{Scene, Setting};
+use crate::scene::Scene;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::scene::Setting;
 
 /// The flags that tell of tip and scan, over the scene.
 #[derive(Clone, Debug, Default, Args)]
@@ -58,6 +60,7 @@ impl ToldFlags {
     ///
     /// # Errors
     /// As [`Self::scene`], and for a scene whose text is of a form in which nothing can be set.
+    #[cfg(any(feature = "ros", feature = "r2r"))]
     pub fn scene_text(&self, path: Option<&Path>) -> Result<String, CliError> {
         let yaml = match path {
             Some(path) => Scene::read_with_text(path)?.1,

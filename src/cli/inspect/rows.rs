@@ -1,8 +1,9 @@
 //! From a drawing and what was measured to characteristics with their decisions.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::SystemTime;
 
-use chrono::{SecondsFormat, Utc};
+use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::{Point3, Vector3};
 
 use super::arguments::InspectArguments;
@@ -268,7 +269,7 @@ fn record_of(
         part: arguments.part.clone(),
         serial: arguments.serial.clone(),
         operator: arguments.operator.clone(),
-        date: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
+        date: DateTime::<Utc>::from(SystemTime::now()).to_rfc3339_opts(SecondsFormat::Secs, true),
         program: format!("touchup {VERSION}"),
         rule: params.rule.name().to_owned(),
         confidence: params.confidence,
