@@ -53,7 +53,7 @@ pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError>
 /// - `comment`: lines above a table; JSON has none.
 ///
 /// # Errors
-/// [`FileError::Write`].
+/// [`NominalFileError::File`].
 pub fn write_nominal(path: &Path, records: &[NominalRecord], comment: &[&str]) -> Result<(), NominalFileError> {
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let written = if is_json { json::write(path, records) } else { rows::write(path, records, comment) };
