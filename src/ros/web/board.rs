@@ -6,8 +6,7 @@ use std::sync::{Arc, Mutex};
 use serde::Serialize;
 use tokio::sync::watch;
 
-use super::knowledge::{Known, MeshState, TouchedVertex};
-use super::mesh_copy::{MeshCopy, PageId};
+use super::mesh_copy::{MeshCopy, MeshState, PageId, TouchedVertex};
 use crate::ros::locked;
 use crate::ros::messages::{
     DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, MeshPatch, Path, ProbeResult, ProbeTouch,
@@ -69,6 +68,13 @@ fn keep<M>(kept: &mut VecDeque<(u64, M)>, number: u64, message: M) {
         kept.pop_front();
     }
     kept.push_back((number, message));
+}
+
+/// What is known of the vertices at one state, as frames for the pages.
+#[derive(Debug)]
+pub(super) struct Known {
+    pub state: MeshState,
+    pub frames: Vec<Vec<u8>>,
 }
 
 /// Read by all pages.

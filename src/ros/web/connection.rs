@@ -14,11 +14,10 @@ use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::sync::watch;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-use super::Site;
 use super::access::Role;
 use super::board::text_of;
-use super::knowledge::MeshState;
-use super::mesh_copy::PageId;
+use super::mesh_copy::{MeshState, PageId};
+use super::site::Site;
 use crate::ros::messages::MeshPatch;
 use crate::ros::port::Reply;
 

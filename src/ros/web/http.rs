@@ -16,11 +16,11 @@ use axum::routing::get;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::Site;
 use super::access::Role;
 use super::connection;
 use super::downloads::{body_of, sessions};
 use super::page::PAGE;
+use super::site::Site;
 
 /// Pages at a time at most.
 const MOST_PAGES: usize = 16;

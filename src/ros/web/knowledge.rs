@@ -10,10 +10,12 @@ use nalgebra::Point3;
 use tokio::sync::oneshot;
 use tokio::time::sleep;
 
-use super::Site;
+use super::board::Known;
+use super::mesh_copy::{MeshState, TouchedVertex};
+use super::site::Site;
 use super::vertex_numbers::{VertexNumber, frame};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::reconstruct::{Patcher, Support};
+use crate::reconstruct::Patcher;
 use crate::ros::port::{Arrival, Reply};
 
 /// Period of the look at the mesh.
@@ -24,18 +26,6 @@ const QUIET: Duration = Duration::from_millis(1000);
 const COPY_WAIT: Duration = Duration::from_secs(30);
 /// Vertices this near to a contact that was rejected are marked, m.
 const BESIDE_OUTLIER: f64 = 1e-3;
-
-/// A state of the mesh: session and version.
-pub(super) type MeshState = (String, u64);
-/// A vertex that rests on touches: its number, its place, m in O, and its support.
-pub(super) type TouchedVertex = (u32, Point3<f64>, Support);
-
-/// What is known of the vertices at one state, as frames for the pages.
-#[derive(Debug)]
-pub(super) struct Known {
-    pub state: MeshState,
-    pub frames: Vec<Vec<u8>>,
-}
 
 /// Evaluates each state at which the mesh rests, until it is dropped.
 pub(super) async fn follow(site: Arc<Site>) {

@@ -18,7 +18,7 @@ use tokio_rustls::rustls::ServerConfig;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 
-use super::WebError;
+use super::error::WebError;
 
 /// Connections at a time at most.
 const MOST_CONNECTIONS: usize = 64;

@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use super::knowledge::{MeshState, TouchedVertex};
 use crate::mesh::IdSet;
 use crate::reconstruct::Support;
 use crate::ros::messages::{MeshPatch, Time};
@@ -18,6 +17,11 @@ const OF_A_MESSAGE: usize = 1 << 16;
 const NO_VERTEX: u8 = u8::MAX;
 /// Corners of a face that is not there.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
+
+/// A state of the mesh: session and version.
+pub(super) type MeshState = (String, u64);
+/// A vertex that rests on touches: its number, its place, m in O, and its support.
+pub(super) type TouchedVertex = (u32, Point3<f64>, Support);
 
 /// What a vertex rests on that does not rest on the scan.
 fn known_by(support: u8) -> Option<Support> {

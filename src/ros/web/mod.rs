@@ -10,12 +10,14 @@ mod board;
 mod calls;
 mod connection;
 mod downloads;
+mod error;
 mod http;
 mod knowledge;
 mod listener;
 mod mesh_copy;
 mod nominal;
 mod page;
+mod site;
 mod vertex_numbers;
 
 use std::io;
@@ -25,53 +27,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::thread::{Builder, JoinHandle};
 
-use qrcode::QrCode;
-use qrcode::render::unicode::Dense1x2;
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use tokio::net::TcpListener;
 use tokio::sync::Notify;
 
 pub use self::access::Role;
 use self::access::{Access, in_a_link};
-use self::annotations::{AnnotateRequest, Annotations};
+use self::annotations::Annotations;
 use self::board::Board;
-use self::calls::{Answer, Calls, MAY_ONLY_LOOK};
+use self::calls::Calls;
+pub use self::error::WebError;
 pub use self::listener::Certificate;
 use self::nominal::Nominal;
-use super::exchange::RosError;
+use self::site::{ScanShown, Site};
 use super::inbox::Inbox;
 use super::messages::MeshPatch;
 use super::port::{Port, Publication};
-use super::stop::Motion;
 use crate::mesh::{FaceTree, TriMesh};
-
-/// Why the page is not served.
-#[derive(Debug, thiserror::Error)]
-pub enum WebError {
-    /// the address cannot be listened to
-    #[error("the page cannot be served at {address}: {source}; choose another address or port by --web")]
-    Address {
-        /// which
-        address: SocketAddr,
-        /// what the system says
-        source: io::Error,
-    },
-    /// a file of the certificate is none
-    #[error("{}: {why}; --web-certificate and --web-key take PEM files", .file.display())]
-    Certificate {
-        /// which
-        file: PathBuf,
-        /// what is wrong with it
-        why: String,
-    },
-    /// a service has a name that is none
-    #[error(transparent)]
-    Ros(#[from] RosError),
-    /// no thread, no random numbers
-    #[error("the page cannot be served: {0}")]
-    System(#[from] io::Error),
-}
 
 /// Where the page is served, and how.
 #[derive(Clone, Debug)]
@@ -97,136 +68,6 @@ pub struct NodeFacts {
     pub session_folder: PathBuf,
     /// the part as it should be, m in O; `None`: nobody said
     pub nominal: Option<TriMesh>,
-}
-
-/// What all pages share.
-struct Site {
-    board: Board,
-    calls: Calls,
-    inbox: Inbox,
-    access: Access,
-    annotations: Annotations,
-    nominal: Option<Arc<Nominal>>,
-    scan: ScanShown,
-    /// with the tree over its faces
-    scan_mesh: Arc<(TriMesh, FaceTree)>,
-    session_folder: PathBuf,
-    /// pages that are open
-    pages: AtomicUsize,
-    /// … and that were ever opened
-    pages_so_far: AtomicU64,
-    /// address of the page: for links
-    base: String,
-    /// tells the operator beside the machine
-    notify: fn(&str),
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct ScanShown {
-    file: String,
-    faces: usize,
-}
-
-#[derive(Debug, Serialize)]
-struct ArmShown {
-    may_move: bool,
-    motion: Motion,
-    stays_because: Option<&'static str>,
-}
-
-/// The topic `state`.
-#[derive(Debug, Serialize)]
-struct SiteState<'a> {
-    role: Role,
-    program: &'static str,
-    session: String,
-    is_paused: bool,
-    scan: &'a ScanShown,
-    arm: Option<ArmShown>,
-    clients: usize,
-}
-
-impl Site {
-    fn state(&self, role: Role) -> SiteState<'_> {
-        let stops = self.inbox.stops();
-        let arm = stops.arm().map(|(may_move, motion, stays_because)| ArmShown { may_move, motion, stays_because });
-        SiteState {
-            role,
-            program: concat!("touchup ", env!("CARGO_PKG_VERSION")),
-            session: self.board.session(),
-            is_paused: stops.is_paused(),
-            scan: &self.scan,
-            arm,
-            clients: self.pages.load(Ordering::Relaxed),
-        }
-    }
-
-    /// A call of a page: of the page's own, or of a service of the node.
-    fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
-        let own: Option<OwnCall> = match name {
-            "~/annotate_feature" => Some(Self::annotate),
-            "~/invite" => Some(Self::invite),
-            _ => None,
-        };
-        match own {
-            None => self.calls.call(role, name, request, reply),
-            Some(_) if role != Role::Operate => reply.send(Err(MAY_ONLY_LOOK.to_owned())),
-            Some(own) => reply.send(own(self, request)),
-        }
-    }
-
-    fn annotate(&self, request: Value) -> Result<Value, String> {
-        let request: AnnotateRequest = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        let feature = self.board.feature(request.id);
-        self.annotations.annotate(&self.board.session(), request, feature)?;
-        self.board.wake();
-        Ok(json!({ "success": true, "message": "noted" }))
-    }
-
-    /// A link for another page: `{"role": "look"}`.
-    fn invite(&self, request: Value) -> Result<Value, String> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct InviteRequest {
-            role: Role,
-        }
-        let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        if !self.access.needs_cookie() {
-            return Ok(json!({ "link": self.base }));
-        }
-        let secret = self.access.invite(role).map_err(|error| error.to_string())?;
-        Ok(json!({ "link": self.link(secret.text()) }))
-    }
-
-    fn link(&self, token: &str) -> String {
-        format!("{}/pair?token={token}", self.base)
-    }
-
-    /// Somebody came in by a link, which is used up: here is the next.
-    fn note_paired(&self, role: Role) {
-        match self.invitation(role) {
-            Ok(text) => (self.notify)(&format!("a page was let in to {}; {text}", in_words(role))),
-            Err(error) => tracing::warn!(%error, "there is no new link"),
-        }
-    }
-
-    /// A new link in words, and as a QR code.
-    fn invitation(&self, role: Role) -> io::Result<String> {
-        let link = self.link(self.access.invite(role)?.text());
-        let code = QrCode::new(&link).map(|code| code.render::<Dense1x2>().build()).unwrap_or_default();
-        let code = if role == Role::Operate { format!("\n{code}") } else { String::new() };
-        Ok(format!("the next one may {} by {link}{code}", in_words(role)))
-    }
-}
-
-/// What the page itself is asked, and not the node.
-type OwnCall = fn(&Site, Value) -> Result<Value, String>;
-
-fn in_words(role: Role) -> &'static str {
-    match role {
-        Role::Look => "look",
-        Role::Operate => "operate",
-    }
 }
 
 /// Serves until it is dropped.
