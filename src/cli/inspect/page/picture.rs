@@ -1,6 +1,6 @@
 //! The part with a numbered balloon at each feature.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use nalgebra::Point3;
@@ -89,36 +89,72 @@ fn draw_balloon(svg: &mut String, number: usize, decision: &str, is_found: bool,
     );
 }
 
+/// Points of the outline on which balloons stand.
+const OUTLINE_POINTS: usize = 720;
+/// Balloons are so far apart along it, in radii, where there is room.
+const APART: f64 = 2.8;
+
 /// Places of the balloons around the part, each in the direction of its feature, apart from one another.
 ///
 /// - `size`: of the picture, pixels.
 fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]> {
     let middle = [width / 2.0 + MARGIN, height / 2.0 + MARGIN];
-    let [a, b] = [width / 2.0 + MARGIN - 1.3 * RADIUS, height / 2.0 + MARGIN - 1.3 * RADIUS];
+    let half = [width / 2.0 + MARGIN - 1.3 * RADIUS, height / 2.0 + MARGIN - 1.3 * RADIUS];
+    let angle_of = |point: f64| TAU * point / OUTLINE_POINTS as f64 - PI;
+    let outline: Vec<_> =
+        (0..=OUTLINE_POINTS).map(|point| on_rectangle(angle_of(point as f64), half, middle)).collect();
+    // from the first point along the outline to each
+    let mut along = vec![0.0];
+    for (one, next) in outline.iter().zip(&outline[1..]) {
+        along.push(along[along.len() - 1] + (next[0] - one[0]).hypot(next[1] - one[1]));
+    }
     let mut seats: Vec<(usize, f64)> = places
         .iter()
-        .map(|[x, y]| ((y + MARGIN - middle[1]) / b).atan2((x + MARGIN - middle[0]) / a))
+        .map(|[x, y]| ((y + MARGIN - middle[1]) / half[1]).atan2((x + MARGIN - middle[0]) / half[0]))
+        .map(|angle| along[((angle + PI) / TAU * OUTLINE_POINTS as f64).round() as usize % OUTLINE_POINTS])
         .enumerate()
         .collect();
     seats.sort_by(|one, other| one.1.total_cmp(&other.1));
-    // as far apart as a balloon is wide where there is room, else all around
-    let apart = (2.6 * RADIUS / a.min(b)).min(TAU / places.len().max(1) as f64);
-    for _ in 0..200 {
-        for at in 0..seats.len() {
-            let next = (at + 1) % seats.len();
-            let turn = if next == 0 { TAU } else { 0.0 };
-            let short = apart - (seats[next].1 + turn - seats[at].1);
-            if next != at && short > 1e-9 {
-                seats[at].1 -= short / 2.0;
-                seats[next].1 += short / 2.0;
-            }
-        }
-    }
+    let wanted: Vec<f64> = seats.iter().map(|(_, along)| *along).collect();
     let mut placed = vec![[0.0; 2]; places.len()];
-    for (at, angle) in seats {
-        placed[at] = on_rectangle(angle, [a, b], middle);
+    for ((feature, _), seat) in seats.into_iter().zip(spread(&wanted, along[OUTLINE_POINTS], APART * RADIUS)) {
+        placed[feature] = outline[along.partition_point(|length| *length < seat).min(OUTLINE_POINTS)];
     }
     placed
+}
+
+/// The places along a closed line of this length that are nearest to the wanted ones by least squares, and this far apart, or all around
+/// where there is no room for that.
+///
+/// - `wanted`: ascending. Less what the others before each need, they are to be ascending too: by pooling those that are not
+///   \[Barlow et al. 1972\].
+fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
+    let count = wanted.len();
+    let apart = apart.min(length / count.max(1) as f64);
+    // mean of each pool, and how many are in it
+    let mut pools: Vec<(f64, usize)> = Vec::new();
+    for (at, place) in wanted.iter().enumerate() {
+        pools.push((place - at as f64 * apart, 1));
+        while let [.., (mean, of), (next, more)] = pools[..]
+            && mean >= next
+        {
+            pools.pop();
+            pools.pop();
+            let all = of + more;
+            pools.push(((mean * of as f64 + next * more as f64) / all as f64, all));
+        }
+    }
+    let means = pools.into_iter().flat_map(|(mean, of)| std::iter::repeat_n(mean, of));
+    let placed: Vec<f64> = means.enumerate().map(|(at, mean)| mean + at as f64 * apart).collect();
+    let reach = placed.last().zip(placed.first()).map_or(0.0, |(last, first)| last - first);
+    let (first, step) = match placed.first() {
+        // the last would stand on the first
+        Some(first) if reach > length - apart => (*first, Some(length / count as f64)),
+        Some(first) => (*first, None),
+        None => (0.0, None),
+    };
+    let place = |(at, place): (usize, f64)| step.map_or(place, |step| first + at as f64 * step).rem_euclid(length);
+    placed.into_iter().enumerate().map(place).collect()
 }
 
 /// Where a ray from the middle leaves a rectangle, the corners cut.
@@ -144,6 +180,21 @@ mod tests {
                 assert!((one[0] - other[0]).hypot(one[1] - other[1]) > 2.0 * RADIUS, "{one:?} {other:?}");
             }
         }
+    }
+
+    #[test]
+    fn places_along_a_line_are_moved_by_no_more_than_they_need() {
+        assert_eq!(spread(&[10.0, 50.0], 100.0, 10.0), [10.0, 50.0]);
+        // three at one place: the middle one stays
+        assert_eq!(spread(&[50.0, 50.0, 50.0], 100.0, 10.0), [40.0, 50.0, 60.0]);
+        // around the beginning of the line
+        assert_eq!(spread(&[2.0, 2.0, 2.0], 100.0, 10.0), [92.0, 2.0, 12.0]);
+        // no room: all around
+        assert_eq!(spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0).len(), 4);
+        let mut around = spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0);
+        around.sort_by(f64::total_cmp);
+        assert!(around.windows(2).all(|pair| pair[1] - pair[0] >= 5.0 - 1e-9), "{around:?}");
+        assert!(spread(&[], 100.0, 10.0).is_empty());
     }
 
     #[test]
