@@ -46,7 +46,11 @@ def picture(page):
 
 def rays(page, points, box):
     """Rays in the frame of the part through points of the canvas, m: origins and directions."""
-    camera = page.evaluate("touchup.camera()")
+    return rays_of(page.evaluate("touchup.camera()"), points, box)
+
+
+def rays_of(camera, points, box):
+    """The same through a camera as the page describes it."""
     view = numpy.array(camera["view"]).reshape(4, 4).T
     projection = numpy.array(camera["projection"]).reshape(4, 4).T
     x = 2 * points[:, 0] / box["width"] - 1
