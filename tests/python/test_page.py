@@ -132,7 +132,7 @@ def test_holes_and_bosses_are_listed_with_value_and_expanded_uncertainty_as_the_
         follower.take_until(lambda: follower.newest.get("features", {}).get("features"))
         while True:
             follower.take()
-            # kinds 1 and 4: hole and boss; U = 2 u, mm; one digit more or less where it is large
+            # kinds 1 and 4: hole and boss; U = 2 u, mm
             asked = [one for one in follower.newest["features"]["features"] if one["kind"] in (1, 4) and one["diameter_std"]]
             known = {one["id"]: (1e3 * one["diameter"], 2e3 * one["diameter_std"]) for one in asked}
             rows = page.locator("button.feature").evaluate_all("(rows) => rows.map((row) => row.innerText)")
@@ -140,7 +140,9 @@ def test_holes_and_bosses_are_listed_with_value_and_expanded_uncertainty_as_the_
             for row in rows:
                 if read := re.search(r"^\s*(\d+)\s.*Ø\s(\d+\.\d+)\s±\s(\d+\.\d+)", row, re.S):
                     shown[int(read[1])] = (float(read[2]), float(read[3]))
-            near = [abs(a - b) < 6e-4 for one in shown.keys() & known.keys() for a, b in zip(shown[one], known[one], strict=True)]
+            # to the micrometre, the uncertainty rounded up
+            both = [(shown[one], known[one]) for one in shown.keys() & known.keys()]
+            near = [abs(value - true) < 6e-4 and -1e-6 < u - true_u < 1.001e-3 for (value, u), (true, true_u) in both]
             if shown and shown.keys() == known.keys() and all(near):
                 break
             assert time.monotonic() < until, (shown, known)
