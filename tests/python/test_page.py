@@ -53,6 +53,18 @@ def call(page, service, /, **request):
     )
 
 
+def saved_at_rest(page, node):
+    """Saves the mesh as seen.ply when it rests, which then is what every follower has; the answer."""
+
+    def save():
+        return call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]
+
+    node.wait_for(lambda: save()["mesh_version"] > 0)
+    saved = save()
+    wait_until(page, f"touchup.version() >= {saved['mesh_version']}")
+    return saved
+
+
 def cookie_of(page):
     (cookie,) = page.context.cookies()
     return f"{cookie['name']}={cookie['value']}"
@@ -60,10 +72,7 @@ def cookie_of(page):
 
 def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
     page = page_of(browser, touched)
-    # at rest the mesh of every follower is what is saved
-    touched.wait_for(lambda: call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]["mesh_version"] > 0)
-    saved = call(page, "~/save_mesh", name="seen.ply", overwrite=True)["response"]
-    wait_until(page, f"touchup.version() >= {saved['mesh_version']}")
+    saved = saved_at_rest(page, touched)
     page.get_by_role("button", name="Whole part").click()
     # the line that says that no samples come any more moves the picture when it appears
     page.locator(".remedy").wait_for()
@@ -101,6 +110,7 @@ def test_the_picture_is_that_of_the_saved_mesh_in_its_colours(browser, touched):
 
 def test_a_pick_is_the_first_face_that_a_ray_meets(browser, touched):
     page = page_of(browser, touched)
+    saved_at_rest(page, touched)
     page.evaluate("touchup.idle()")
     mesh = trimesh.load(touched.session / "seen.ply", process=False)
     shares = numpy.random.default_rng(3).uniform([0.3, 0.3], [0.7, 0.7], (40, 2))
