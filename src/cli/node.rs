@@ -7,18 +7,17 @@ use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
 use super::page::path;
-use super::signals::{SignalKind, on_each_signal};
+use super::signals::end_on_signals;
 use super::told::{ToldBy, ToldNumbers};
 use super::web::WebFlags;
-use super::{CliError, Losses, by_reason, counted, notify, print_report, print_result, require, require_positive};
+use super::{CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
 use crate::live::Quantiles;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
-use crate::ros::inbox::{Inbox, inbox};
+use crate::ros::inbox::inbox;
 use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
 use crate::ros::parameters::ParameterValue;
-use crate::ros::port::Arrival;
 use crate::scan::{Scan, read_scan};
 use crate::scene::Scene;
 
@@ -107,23 +106,6 @@ impl NodeArguments {
         let Some(scene) = &self.scene else { return Ok(()) };
         config.parameters.set("scene", &path(scene)?).map_err(CliError::usage)
     }
-}
-
-/// The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still retracts stop and
-/// stay; one more, or the second where no arm moves, waits for nothing.
-fn end_on_signals(inbox: Inbox) -> std::io::Result<()> {
-    on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()], move |count| {
-        if count == 1 {
-            notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
-            // a node that has ended already needs none
-            inbox.put(Arrival::Shutdown);
-            return;
-        }
-        if !inbox.stops().interrupt() {
-            std::process::exit(1);
-        }
-        notify("the arm stops and stays where it is; one more signal ends the node at once");
-    })
 }
 
 fn losses(report: &SessionReport) -> Losses {

@@ -5,7 +5,7 @@ use std::thread::{Builder, sleep};
 use std::time::Duration;
 
 use super::replay::play;
-use super::signals::{SignalKind, on_each_signal};
+use super::signals::end_on_signals;
 use super::web::WebFlags;
 use super::{CliError, notify};
 use crate::clock::Clock;
@@ -15,7 +15,6 @@ use crate::ros::in_process;
 use crate::ros::inbox::inbox;
 use crate::ros::node::{INBOX, NodeEnd, NodeError, Prepared};
 use crate::ros::parameters::{ParameterValue, Parameters};
-use crate::ros::port::Arrival;
 use crate::stylus::MarkerFilter;
 
 /// Period of the look for a page.
@@ -32,17 +31,7 @@ pub(super) fn on_page(
     let ready = Prepared::new(parameters)?;
     let clock = Clock::system();
     let (inbox, arrivals) = inbox(INBOX, &clock);
-    let ending = inbox.clone();
-    let signals = [SignalKind::interrupt(), SignalKind::terminate()];
-    let on_signal = move |count| {
-        if count > 1 {
-            std::process::exit(1);
-        }
-        notify("ends and saves; a second signal ends it at once");
-        // a node that has ended already needs none
-        ending.put(Arrival::Shutdown);
-    };
-    on_each_signal(&signals, on_signal).map_err(NodeError::NoThread)?;
+    end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let (port, touching) = in_process::start_unread(inbox.clone(), &clock);
     let (port, page) = web.serve(&ready, inbox, port)?;
     let running = ready.start(port, arrivals, None)?;

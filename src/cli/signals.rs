@@ -15,6 +15,10 @@ use tokio::signal::unix::{Signal, signal};
 use super::error::{CliError, INTERRUPTED};
 use super::notify;
 use crate::probing::arm::StopRequest;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::inbox::Inbox;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::ros::port::Arrival;
 
 /// Calls `each` on a thread of its own with the number of signals until then, from 1 on.
 pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + Send + 'static) -> io::Result<()> {
@@ -30,6 +34,24 @@ pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + S
         }
     };
     Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
+}
+
+/// The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still retracts stop and
+/// stay; one more, or the second where no arm moves, waits for nothing.
+#[cfg(any(feature = "ros", feature = "r2r"))]
+pub(super) fn end_on_signals(inbox: Inbox) -> std::io::Result<()> {
+    on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()], move |count| {
+        if count == 1 {
+            notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
+            // a node that has ended already needs none
+            inbox.put(Arrival::Shutdown);
+            return;
+        }
+        if !inbox.stops().interrupt() {
+            std::process::exit(1);
+        }
+        notify("the arm stops and stays where it is; one more signal ends the node at once");
+    })
 }
 
 /// Waits for any of them.

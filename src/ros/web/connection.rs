@@ -34,25 +34,18 @@ const MOST_PER_SECOND: u32 = 200;
 /// Kind of a binary message: a `MeshPatch`.
 const MESH_PATCH: u8 = 1;
 
-/// What a page sends.
+/// What a page sends: a call of a service, or a beat of the button that is held.
 #[derive(Debug, Deserialize)]
-#[serde(untagged)]
-enum Asked {
-    /// a call of a service
-    Call {
-        /// by which the page knows the answer
-        id: Value,
-        /// name of the service
-        call: String,
-        #[serde(default)]
-        request: Value,
-    },
-    /// the button is held
-    Beat {
-        /// how often it was sent
-        #[allow(dead_code, reason = "its coming is all that counts")]
-        beat: u64,
-    },
+struct Asked {
+    /// by which the page knows the answer
+    #[serde(default)]
+    id: Value,
+    /// name of the service
+    call: Option<String>,
+    #[serde(default)]
+    request: Value,
+    /// how often it was sent
+    beat: Option<u64>,
 }
 
 /// Serves a page until it goes.
@@ -83,16 +76,18 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
 }
 
 fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
-    let (id, call, request) = match serde_json::from_str(text) {
-        Ok(Asked::Call { id, call, request }) => (id, call, request),
-        Ok(Asked::Beat { .. }) => {
+    let asked = serde_json::from_str(text).map_err(|error| error.to_string());
+    let (id, call, request) = match asked {
+        Ok(Asked { call: None, beat: Some(_), .. }) => {
             if role == Role::Operate {
                 site.inbox.stops().beat();
             }
             return;
         }
-        Err(error) => {
-            let said = json!({ "id": null, "error": format!("this is no call: {error}") });
+        Ok(Asked { id, call: Some(call), request, .. }) if !id.is_null() => (id, call, request),
+        refused => {
+            let why = refused.err().unwrap_or_else(|| "it has no id and call, and no beat".to_owned());
+            let said = json!({ "id": null, "error": format!("this is no call: {why}") });
             return drop(answers.try_send(said.to_string()));
         }
     };
@@ -139,7 +134,8 @@ async fn send(
         messages.extend(site.board.read(&mut seen).into_iter().map(Message::text));
         let mesh = site.board.mesh_for(page);
         let has_more = mesh.is_some();
-        let deviations = site.nominal.clone().zip(mesh.clone());
+        // copied where there is something to compare with
+        let deviations = site.nominal.clone().and_then(|nominal| Some((nominal, mesh.clone()?)));
         messages.extend(mesh.and_then(|patch| Some(Message::binary(frame_of(&patch)?))));
         if let Some((nominal, patch)) = deviations {
             // a millisecond for each thousand vertices, in which no other page is to wait

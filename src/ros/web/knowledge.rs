@@ -11,7 +11,7 @@ use tokio::sync::oneshot;
 use tokio::time::sleep;
 
 use super::board::Known;
-use super::mesh_copy::{MeshState, TouchedVertex};
+use super::mesh_copy::{MeshState, OF_A_MESSAGE, TouchedVertex};
 use super::site::Site;
 use super::vertex_numbers::{VertexNumber, frame};
 use crate::mesh::{FaceTree, TriMesh};
@@ -58,9 +58,11 @@ fn frames_of(copy: &Receiver<Patcher>, scan: &(TriMesh, FaceTree), touched: &[To
     patcher.flush();
     let places: Vec<_> = touched.iter().map(|(_, place, support)| (*place, *support)).collect();
     let sigmas = patcher.sigma_at(&scan.0, &scan.1, &places);
-    let of_sigma = touched.iter().zip(sigmas).map(|((vertex, ..), sigma)| (*vertex, sigma as f32));
+    let of_sigma: Vec<_> = touched.iter().zip(sigmas).map(|((vertex, ..), sigma)| (*vertex, sigma as f32)).collect();
+    // no message is larger than one of the mesh
+    let sigma_frames = of_sigma.chunks(OF_A_MESSAGE).map(|part| frame(VertexNumber::Sigma, part.iter().copied()));
     let outliers: Vec<_> = patcher.outliers().last().map(|outlier| outlier.point).collect();
     let is_beside = |place: &Point3<f64>| outliers.iter().any(|point| (point - place).norm() < BESIDE_OUTLIER);
     let beside = touched.iter().filter(|(_, place, _)| is_beside(place)).map(|(vertex, ..)| (*vertex, 1.0));
-    vec![frame(VertexNumber::Sigma, of_sigma), frame(VertexNumber::Outlier, beside)]
+    sigma_frames.chain([frame(VertexNumber::Outlier, beside)]).collect()
 }

@@ -11,7 +11,7 @@ use crate::reconstruct::Support;
 use crate::ros::messages::{MeshPatch, Time};
 
 /// Vertices, or faces, of one message at most: 1.4 MB.
-const OF_A_MESSAGE: usize = 1 << 16;
+pub(super) const OF_A_MESSAGE: usize = 1 << 16;
 
 /// Support of a vertex that is not there.
 const NO_VERTEX: u8 = u8::MAX;

@@ -57,7 +57,7 @@ pub struct WebParams {
     pub certificate: Option<Certificate>,
 }
 
-/// What a page is told of the node, and does not change.
+/// Facts about the node that stay as they are while it runs.
 #[derive(Debug)]
 pub struct NodeFacts {
     /// where the scan was read from
