@@ -104,7 +104,7 @@ impl Site {
         Ok(json!({ "success": true, "message": "noted" }))
     }
 
-    /// A link for another page: `{"role": "look"}`.
+    /// A link for another page, and its QR code: `{"role": "look"}`.
     fn invite(&self, request: Value) -> Result<Value, String> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -112,11 +112,11 @@ impl Site {
             role: Role,
         }
         let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        if !self.access.needs_cookie() {
-            return Ok(json!({ "link": self.base }));
-        }
-        let secret = self.access.invite(role).map_err(|error| error.to_string())?;
-        Ok(json!({ "link": self.link(secret.text()) }))
+        let link = match self.access.needs_cookie() {
+            true => self.link(self.access.invite(role).map_err(|error| error.to_string())?.text()),
+            false => self.base.clone(),
+        };
+        Ok(json!({ "link": link, "code": code_rows(&link) }))
     }
 
     fn link(&self, token: &str) -> String {
@@ -142,6 +142,13 @@ impl Site {
 
 /// What the page itself is asked, and not the node.
 type OwnCall = fn(&Site, Value) -> Result<Value, String>;
+
+/// A QR code, row by row: 1 where it is dark.
+fn code_rows(text: &str) -> Vec<String> {
+    let Ok(code) = QrCode::new(text) else { return Vec::new() };
+    let modules: Vec<char> = code.to_colors().into_iter().map(|colour| colour.select('1', '0')).collect();
+    modules.chunks(code.width()).map(String::from_iter).collect()
+}
 
 fn in_words(role: Role) -> &'static str {
     match role {
