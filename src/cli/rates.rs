@@ -9,6 +9,7 @@ use crate::haptic::{RefineError, RefineParams};
 use crate::live::{Ended, Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::PatcherParams;
+use crate::session::StrokeReplay;
 use crate::stylus::Sample;
 use crate::threads::Threads;
 
@@ -91,11 +92,13 @@ impl Rates {
         (Ok(()), time)
     }
 
-    /// Takes the last stroke back, or does it again.
-    pub fn change_strokes(&mut self, is_undo: bool) {
-        let changed = if is_undo { self.engine.undo() } else { self.engine.redo() };
-        if let Err(error) = changed {
-            self.stopped = Some(error);
+    /// Takes back and does again what was before the sample of this stamp, ns.
+    pub fn change_strokes(&mut self, strokes: &mut StrokeReplay, before_ns: i64) {
+        while let Some((_, is_undo)) = strokes.next_before(before_ns) {
+            let changed = if is_undo { self.engine.undo() } else { self.engine.redo() };
+            if let Err(error) = changed {
+                self.stopped = Some(error);
+            }
         }
     }
 

@@ -34,7 +34,7 @@ use crate::replay::{Recording, Replayed, each_sample, marker_filter};
 use crate::ros::node::NodeEnd;
 use crate::scan::{Scan, read_scan};
 use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
-use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChange, UncertaintySummary};
+use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, UncertaintySummary};
 use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
 use crate::threads::Threads;
 
@@ -100,9 +100,9 @@ pub(super) struct RefineArguments {
     /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is then a doubt and not sure
     #[arg(skip)]
     pub touches_flaws: bool,
-    /// Strokes that were taken back or done again in the session
+    /// Strokes that were taken back, done again, taken out or put back in the session
     #[arg(skip)]
-    strokes: Vec<StrokeChange>,
+    strokes: StrokeChanges,
     /// Also prints timings, rejected samples and the stages built from the scene
     #[arg(long, short)]
     verbose: bool,
@@ -317,7 +317,7 @@ impl RefineArguments {
         let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
         require(patch.is_some() || !self.live, NO_PATCH)?;
         let mut rates = Rates::new(mesh, params, patch, self.live)?;
-        if !self.strokes.is_empty() {
+        if self.strokes.has_exchanges() {
             rates.engine.keep_strokes();
         }
         let load_s = started.elapsed().as_secs_f64();
@@ -325,13 +325,8 @@ impl RefineArguments {
 
         let started = Instant::now();
         let mut pushes = Pushes::default();
-        let mut strokes = self.strokes.iter().peekable();
-        // those that were taken back or done again before the sample of this stamp
-        let mut change_strokes = |before_ns: i64, rates: &mut Rates| {
-            while let Some(change) = strokes.next_if(|change| change.after_ns < before_ns) {
-                rates.change_strokes(change.is_undo);
-            }
-        };
+        let mut strokes = self.strokes.replay();
+        let mut taken_out = 0;
         let monitor = RefCell::new(InputMonitor::new(scene.input_monitor_params(recording_frame))?);
         let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
         // an update that takes every sample for contact says nothing about contact
@@ -345,7 +340,11 @@ impl RefineArguments {
             &mut || progress.step(),
             &mut |message| monitor.borrow_mut().message(message),
             |sample| {
-                change_strokes(sample.stamp_ns, &mut rates);
+                rates.change_strokes(&mut strokes, sample.stamp_ns);
+                if !strokes.takes(sample.stamp_ns) {
+                    taken_out += 1;
+                    return;
+                }
                 pushes.push(&mut rates, sample);
                 let contact = match &mut observer {
                     Some(observer) => observer.observe(sample).ok(),
@@ -361,7 +360,7 @@ impl RefineArguments {
                 }
             },
         )?;
-        change_strokes(i64::MAX, &mut rates);
+        rates.change_strokes(&mut strokes, i64::MAX);
         let monitor = monitor.into_inner();
         let tree = FaceTree::new_by(&as_scanned, &Threads);
         let findings = self.doubt(&monitor, &as_scanned, &tree, pushes.accepted)?;
@@ -393,6 +392,9 @@ impl RefineArguments {
         pushes.refused.extend(std::mem::take(&mut replayed.refused));
         if counts.outside_region > 0 {
             pushes.refused.insert("outside_region".to_owned(), counts.outside_region);
+        }
+        if taken_out > 0 {
+            pushes.refused.insert("taken_out".to_owned(), taken_out);
         }
         let wrench_offset = monitor
             .clock_offset()

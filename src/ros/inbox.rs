@@ -294,7 +294,7 @@ mod tests {
         }
         assert_refused!(Flag(Default::default()), Unflag(Default::default()), Detect(Default::default()), ArmState);
         assert_refused!(Save(Default::default()), Resync(Default::default()), Undo(Default::default()), Reset);
-        assert_refused!(Redo(Default::default()));
+        assert_refused!(Redo(Default::default()), TakeOut(Default::default()));
         let (to, answer) = reply();
         let order = ArmOrder::Feature(ProbeFeatureRequest { id: 7, ..Default::default() }, to);
         inbox.put(Arrival::Call(Call::Arm(order)));

@@ -62,6 +62,8 @@ pub enum Call {
     Undo(UndoRequest, Reply<UndoResponse>),
     /// `~/redo`
     Redo(UndoRequest, Reply<UndoResponse>),
+    /// `~/take_out_touch`
+    TakeOut(TakeOutTouchRequest, Reply<TakeOutTouchResponse>),
     /// `~/reset`
     Reset(Reply<TriggerResponse>),
     /// `~/arm_state`

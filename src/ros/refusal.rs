@@ -66,6 +66,7 @@ impl Call {
             Self::Save(_, reply) => reply.send(SaveMeshResponse { message, ..Default::default() }),
             Self::Resync(_, reply) => reply.send(ResyncMeshResponse { message, ..Default::default() }),
             Self::Undo(_, reply) | Self::Redo(_, reply) => reply.send(UndoResponse { message, ..Default::default() }),
+            Self::TakeOut(_, reply) => reply.send(TakeOutTouchResponse { message, ..Default::default() }),
             Self::Reset(reply) | Self::ArmState(reply) => reply.send(TriggerResponse { message, ..Default::default() }),
             Self::Arm(order) => order.refuse(Header::default(), code, why),
         }

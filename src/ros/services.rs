@@ -48,6 +48,7 @@ services! {
     "~/resync_mesh": ResyncMesh, |to, request, reply| to.call(Call::Resync(request, reply));
     "~/undo": Undo, |to, request, reply| to.call(Call::Undo(request, reply));
     "~/redo": Undo, |to, request, reply| to.call(Call::Redo(request, reply));
+    "~/take_out_touch": TakeOutTouch, |to, request, reply| to.call(Call::TakeOut(request, reply));
     "~/reset": Trigger, |to, _, reply| to.call(Call::Reset(reply));
     "~/pause": SetBool, |to, request, reply| reply.send(to.stops().pause(request.data));
     "~/stop": Trigger, |to, _, reply| reply.send(to.stops().stop());

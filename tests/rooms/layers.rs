@@ -34,7 +34,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
-    ("session", "clock numeric stylus mesh reconstruct haptic live features io scan"),
+    ("session", "clock numeric stylus mesh reconstruct haptic live features io scan replay"),
     (
         "report",
         "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",

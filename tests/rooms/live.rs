@@ -513,6 +513,53 @@ fn strokes_are_undone_and_redone_bit_for_bit() {
     assert!(!patcher.redo());
 }
 
+fn take(engine: &mut Engine, samples: &[Sample]) {
+    for sample in samples {
+        engine.push(sample).unwrap();
+    }
+}
+
+/// The samples go on while the evidence is made again without one in the middle; the last one goes when nothing comes any more.
+#[test]
+fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it() {
+    let stream = last_strokes(4, 0.15);
+    let mut counted = patcher(&stream);
+    contacts(&stream).iter().for_each(|contact| counted.push(contact));
+    counted.flush();
+    let (samples, count) = (&stream.samples, stream.samples.len());
+    for (span, asked, made) in
+        [(counted.stroke(1).unwrap(), count * 7 / 10, count * 8 / 10), (counted.last_stroke().unwrap(), count, count)]
+    {
+        let is_left = |sample: &&Sample| !span.contains(sample.stamp_ns);
+        assert!(span.until_ns == i64::MAX || span.until_ns < samples[asked].stamp_ns, "it is over");
+        let mut live = engine(&stream, Pace::default(), Gate::default());
+        take(&mut live, &samples[..asked]);
+        let mut replay = live.begin_replay().unwrap().unwrap();
+        take(&mut live, &samples[asked..made]);
+        samples[..asked].iter().filter(is_left).for_each(|sample| replay.push(sample));
+        live.end_replay(Some(replay)).unwrap();
+        assert!(live.is_replacing());
+        take(&mut live, &samples[made..]);
+        let mut never = engine(&stream, Pace::default(), Gate::default());
+        take(&mut never, &samples.iter().filter(is_left).copied().collect::<Vec<_>>());
+
+        let rested = [&mut live, &mut never].map(|engine| {
+            while !engine.settle().unwrap() {
+                std::thread::yield_now();
+            }
+            let mut probed = Vec::new();
+            engine.take_probed().unwrap().apply_to(&mut probed);
+            (triangles(engine.refiner().mesh()), *engine.refiner().contact().unwrap(), probed)
+        });
+        assert!(!live.is_replacing());
+        assert!(rested[0].0 == rested[1].0, "the mesh at rest");
+        assert_eq!(rested[0].1, rested[1].1, "bias and friction");
+        assert!(rested[0].2 == rested[1].2 && !rested[0].2.is_empty(), "the touches");
+        let [live, never] = [live, never].map(|engine| whole(&stream, &engine.finish().unwrap().patcher.unwrap()));
+        assert!(live == never, "mesh, uncertainty and touches at the end");
+    }
+}
+
 #[test]
 fn undoing_while_touching_brings_the_mesh_back() {
     let stream = last_strokes(4, 0.15);

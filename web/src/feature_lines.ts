@@ -13,7 +13,7 @@ const CORNERS = 48;
 /** Off the surface, as a share of the feature's size, so that it is not half hidden. */
 const RAISED = 0.004;
 
-export const FEATURE_COLOURS = { flagged: "#a2058a", touched: "#0a3fd6", mesh: "#00788a", selected: "#d55e00", path: "#7a3fb0" };
+export const FEATURE_COLOURS = { flagged: "#a2058a", touched: "#0a3fd6", mesh: "#00788a", selected: "#d55e00", path: "#7a3fb0", touch: "#e00000" };
 
 export class Lines extends LineSegments2 {
   constructor(width: number) {
@@ -69,6 +69,14 @@ export function drawPath(lines: Lines, stops: Xyz[], size: number): void {
     }
   }
   const { r, g, b } = new Color(FEATURE_COLOURS.path);
+  lines.draw(places, Array.from({ length: places.length / 3 }, () => [r, g, b]).flat());
+}
+
+/** A touch as a line through its contacts. */
+export function drawTouch(lines: Lines, contacts: Xyz[]): void {
+  const line = contacts.map(triple).filter((contact) => contact !== null);
+  const places = line.slice(1).flatMap((to, i) => [...line[i], ...to]);
+  const { r, g, b } = new Color(FEATURE_COLOURS.touch);
   lines.draw(places, Array.from({ length: places.length / 3 }, () => [r, g, b]).flat());
 }
 

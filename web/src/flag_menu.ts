@@ -4,6 +4,7 @@ import { FLAGGABLE, kindText } from "./feature_facts";
 import { t } from "./language";
 import type { Model } from "./model";
 import type { Operating } from "./operating";
+import type { TakeOut } from "./take_out";
 
 /** How far around is looked when nothing else is known: the parameter flag_radius_mm. */
 const AS_CONFIGURED = 0;
@@ -17,6 +18,7 @@ export class FlagMenu {
   constructor(
     private readonly model: Model,
     private readonly operating: Operating,
+    private readonly takeOut: TakeOut,
   ) {
     const kinds = FLAGGABLE.map((kind) => operating.guard(button(null, kindText(kind), () => void this.flag(kind))));
     const close = button("close", "close", () => this.close(), "ghost", true);
@@ -24,13 +26,16 @@ export class FlagMenu {
       el("div", { class: "row" }, el("p", {}, el("strong", { text: "flagHere" })), close),
       el("p", { class: "muted", text: "flagHow" }),
       el("div", { class: "kinds" }, ...kinds),
+      takeOut.element,
     );
+    takeOut.onTaken = () => this.close();
     this.element.addEventListener("keydown", (event) => event.key === "Escape" && this.close());
   }
 
-  /** @param place on the part, m. @param x, y where to open, px in the picture. */
-  open(place: [number, number, number], x: number, y: number): void {
+  /** @param place on the part, m. @param isTouched whether that was touched. @param x, y where to open, px in the picture. */
+  open(place: [number, number, number], isTouched: boolean, x: number, y: number): void {
     this.place = place;
+    if (isTouched) this.takeOut.look(place);
     this.element.hidden = false;
     const around = this.element.parentElement;
     const { offsetWidth, offsetHeight } = this.element;
@@ -43,6 +48,7 @@ export class FlagMenu {
   close(): void {
     if (this.element.hidden) return;
     this.element.hidden = true;
+    this.takeOut.forget();
     this.onClose();
   }
 

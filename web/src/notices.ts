@@ -3,11 +3,12 @@
  * screen reader.
  */
 import { CallError } from "./connection";
-import { el } from "./dom";
+import { button, el } from "./dom";
 import { t } from "./language";
+import type { TextKey } from "./texts";
 
-/** How long a notice stays, ms; one about an error stays longer. */
-const STAYS = { good: 4000, bad: 12_000 };
+/** How long a notice stays, ms; one about an error stays longer, one with something to do longest. */
+const STAYS = { good: 4000, bad: 12_000, offer: 60_000 };
 /** More at once nobody reads. */
 const MOST = 3;
 
@@ -16,6 +17,16 @@ export class Notices {
 
   good(words: string): void {
     this.tell(words, "good");
+  }
+
+  /** With a button for what can be done about it, once. */
+  offer(words: string, name: TextKey, action: () => void): void {
+    const notice = this.tell(words, "good", STAYS.offer);
+    const act = button("undo", name, () => {
+      notice.remove();
+      action();
+    });
+    notice.lastElementChild?.before(act);
   }
 
   bad(words: string): void {
@@ -36,12 +47,13 @@ export class Notices {
     this.bad(t("failedRefused", { reason }));
   }
 
-  private tell(words: string, kind: keyof typeof STAYS): void {
+  private tell(words: string, kind: "good" | "bad", stays = STAYS[kind]): HTMLElement {
     const close = el("button", { class: "button ghost small", label: "close", attributes: { type: "button" } }, "×");
     const notice = el("div", { class: `notice ${kind}` }, el("span", {}, words), close);
     close.addEventListener("click", () => notice.remove());
     this.element.append(notice);
     while (this.element.childElementCount > MOST) this.element.firstElementChild?.remove();
-    setTimeout(() => notice.remove(), STAYS[kind]);
+    setTimeout(() => notice.remove(), stays);
+    return notice;
   }
 }

@@ -26,10 +26,10 @@ export class Operating {
     return control;
   }
 
-  /** Calls a service that answers success and message; tells how it went. @returns the answer, null when it failed. */
-  async call<T extends Answer>(service: string, request: object = {}, done?: (answer: T) => string): Promise<T | null> {
+  /** Calls a service that answers success and message; tells how it went. @param within ms. @returns the answer, null when it failed. */
+  async call<T extends Answer>(service: string, request: object = {}, done?: (answer: T) => string, within?: number): Promise<T | null> {
     try {
-      const answer = await this.connection.call<T>(service, request);
+      const answer = await this.connection.call<T>(service, request, within);
       if (answer.success) {
         if (done !== undefined) this.notices.good(done(answer));
         return answer;

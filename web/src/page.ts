@@ -24,7 +24,9 @@ import { settings } from "./settings";
 import { Setup } from "./setup";
 import { Share } from "./share";
 import { applyTheme, StatusBar } from "./status_bar";
+import { TakeOut } from "./take_out";
 import { installTestHook } from "./test_hook";
+import { isTouched } from "./touch_choice";
 import { ForceBar, ViewBar } from "./view_bar";
 import { Vector3 } from "three";
 
@@ -39,14 +41,15 @@ export function buildPage(connection: Connection): void {
   const model = new Model(connection);
   const notices = new Notices();
   const operating = new Operating(connection, model, notices);
-  const flagMenu = new FlagMenu(model, operating);
+  const takeOut = new TakeOut(model, operating, (contacts) => picture.showTouch(contacts));
+  const flagMenu = new FlagMenu(model, operating, takeOut);
   const picture = new Picture(store, {
     onSelect: (id) => model.select(model.selected === id ? null : id),
     onTap: (hit, x, y) => {
       flagMenu.close();
       if (hit === null) return model.select(null);
       picture.showMark(hit.point);
-      flagMenu.open(hit.point, x, y);
+      flagMenu.open(hit.point, isTouched(store, hit.face), x, y);
     },
   });
   flagMenu.onClose = () => picture.showMark(null);

@@ -4,7 +4,7 @@
 import { Color, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector2, Vector3 } from "three";
 import { CameraMan } from "./camera_man";
 import { el } from "./dom";
-import { drawFeatures, drawPath, Lines } from "./feature_lines";
+import { drawFeatures, drawPath, drawTouch, Lines } from "./feature_lines";
 import { Labels } from "./labels";
 import { label } from "./language";
 import type { MeshStore } from "./mesh_store";
@@ -19,7 +19,7 @@ const STILL = 8;
 /** A press that lasts longer is none either, ms. */
 const BRIEF = 600;
 /** Widths of lines, px. */
-const WIDTHS = { features: 3, path: 4 };
+const WIDTHS = { features: 3, path: 4, touch: 7 };
 
 export interface Taps {
   onSelect: (id: number) => void;
@@ -37,6 +37,7 @@ export class Picture {
   readonly tip = new TipView();
   private readonly features = new Lines(WIDTHS.features);
   private readonly path = new Lines(WIDTHS.path);
+  private readonly touch = new Lines(WIDTHS.touch);
   private readonly mark = new Mesh(new SphereGeometry(1, 20, 12), new MeshBasicMaterial({ color: "#a2058a", depthTest: false }));
 
   constructor(
@@ -51,8 +52,11 @@ export class Picture {
     this.labels = new Labels(this.stage, taps.onSelect);
     this.element.append(this.labels.layer);
     this.mark.visible = false;
+    // it lies in the surface, which is not to hide it
+    this.touch.material.depthTest = false;
+    this.touch.renderOrder = 1;
     const all = new Group();
-    all.add(this.mesh.mesh, this.features, this.path, this.tip, this.mark);
+    all.add(this.mesh.mesh, this.features, this.path, this.touch, this.tip, this.mark);
     this.stage.scene.add(all);
     this.stage.beforeFrame.push(() => this.mesh.update());
     this.listen(taps);
@@ -73,6 +77,12 @@ export class Picture {
 
   showPath(stops: Xyz[]): void {
     drawPath(this.path, stops, 0.012 * this.size());
+    this.stage.ask();
+  }
+
+  /** The touch that may be taken out, by contacts of it; none takes it away. */
+  showTouch(contacts: Xyz[]): void {
+    drawTouch(this.touch, contacts);
     this.stage.ask();
   }
 

@@ -81,6 +81,13 @@ export const texts = {
   flagHere: ["Measure a feature here", "Hier ein Merkmal messen", "Medir aquí un elemento"],
   flagHow: ["What is it? It will be looked for around this place.", "Was ist es? Es wird um diese Stelle gesucht.", "¿Qué es? Se buscará alrededor de este punto."],
   flagged: ["{kind}: flagged. Now touch it.", "{kind}: markiert. Jetzt antasten.", "Marcado: {kind}. Ahora, toque ahí."],
+  touchHere: ["The touch here, drawn red; its contacts: {contacts}.", "Die Antastung hier, rot gezeichnet; ihre Kontakte: {contacts}.", "El toque en este punto, dibujado en rojo; sus contactos: {contacts}."],
+  takeOutTouch: ["Take out this touch", "Diese Antastung herausnehmen", "Quitar este toque"],
+  touchTakingOut: ["Taking the touch out …", "Die Antastung wird herausgenommen …", "Quitando el toque …"],
+  touchTakenOut: ["The touch is out, as if it had never been.", "Die Antastung ist heraus, als wäre sie nie gewesen.", "El toque se ha quitado, como si nunca se hubiera hecho."],
+  putBack: ["Put it back", "Wieder aufnehmen", "Volver a ponerlo"],
+  touchPuttingBack: ["Putting the touch back …", "Die Antastung wird wieder aufgenommen …", "Volviendo a poner el toque …"],
+  touchPutBack: ["The touch counts again.", "Die Antastung zählt wieder.", "El toque vuelve a contar."],
   // guidance
   panel: ["Features and guidance", "Merkmale und Anleitung", "Elementos y guía"],
   sheet: ["Larger or smaller panel", "Bereich größer oder kleiner", "Panel más grande o más pequeño"],

@@ -134,6 +134,7 @@ texts! {
     SaveMeshResponse: message, path;
     ResyncMeshResponse: message, session;
     UndoResponse: message;
+    TakeOutTouchResponse: message;
     TriggerResponse: message;
     SetBoolResponse: message;
     ProbeFeatureResponse: result.message, result.header.frame_id;
@@ -220,8 +221,11 @@ mod tests {
         };
         let path = "/home/somebody/sessions/2026-01-31T12-00-00/refined.ply".repeat(2);
         let saved = SaveMeshResponse { message: message(), path, ..SaveMeshResponse::default() };
+        let points = vec![Point::default(); 24];
+        let found = TakeOutTouchResponse { message: message(), points, ..TakeOutTouchResponse::default() };
         let sizes = [
             ("detect_features", size(&detected)),
+            ("take_out_touch", size(&found)),
             ("probe_feature", size(&ProbeFeatureResponse { result: result(message()) })),
             ("probe: get_result", size(&GetResultResponse { status: GoalStatusEnum::Succeeded, result: ended })),
             ("probe: cancel_goal", size(&cancelled)),
@@ -260,6 +264,9 @@ mod tests {
         fits(DetectFeaturesResponse { message: long(), ids: (0..128).collect(), ..DetectFeaturesResponse::default() });
         fits(ResyncMeshResponse { message: long(), ..ResyncMeshResponse::default() });
         fits(UndoResponse { message: long(), ..UndoResponse::default() });
+        let points = vec![Point::default(); 24];
+        let found = fits(TakeOutTouchResponse { message: long(), points, ..TakeOutTouchResponse::default() });
+        assert_eq!(found.points.len(), 24);
         fits(FlagFeatureResponse { message: long(), ..FlagFeatureResponse::default() });
         fits(UnflagFeatureResponse { message: long(), success: true });
         fits(SetBoolResponse { message: long(), success: true });

@@ -14,6 +14,7 @@ use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
 use super::replica::MeshVersion;
 use super::session::{NodeSession, ResultFiles};
+use super::take_out::BUSY;
 use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
 use crate::probing::execute::Flag;
@@ -24,7 +25,7 @@ use crate::ros::messages::{
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Call, Endpoint, Reply};
 use crate::ros::stop::NO_ARM;
-use crate::session::StrokeChange;
+use crate::session::{Exchange, StrokeChange};
 
 /// A flag may reach so far, m.
 const LARGEST_RADIUS: f64 = 1.0;
@@ -50,6 +51,7 @@ impl RefinementWorker {
             Call::Resync(_, reply) => self.resync(reply),
             Call::Undo(request, reply) => reply.send(self.change_strokes(&request, true)),
             Call::Redo(request, reply) => reply.send(self.change_strokes(&request, false)),
+            Call::TakeOut(request, reply) => self.take_out_touch(&request, reply),
             Call::Reset(reply) => {
                 let begun = self.begin_again().map(|name| format!("begun again: session {name}"));
                 reply.send(trigger(begun.map_err(|error| error.to_string())));
@@ -82,21 +84,27 @@ impl RefinementWorker {
     }
 
     fn flag_of(&self, request: &FlagFeatureRequest) -> Result<Flag, String> {
-        let radius = if request.search_radius == 0.0 { self.flag_radius() } else { request.search_radius };
-        if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
-            return Err(format!(
-                "search_radius is {radius} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm"
-            ));
-        }
+        let radius = self.search_radius(request.search_radius)?;
         let place = self.point_in_object(&request.point)?;
         Ok(Flag { id: 0, kind: kind_of(request.kind)?, place, radius })
+    }
+
+    /// How far around a place is looked, m.
+    ///
+    /// - `given`: of a request; 0: the parameter.
+    pub(super) fn search_radius(&self, given: f64) -> Result<f64, String> {
+        let radius = if given == 0.0 { self.flag_radius() } else { given };
+        let is_usable = radius > 0.0 && radius <= LARGEST_RADIUS;
+        is_usable.then_some(radius).ok_or_else(|| {
+            format!("search_radius is {radius} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm")
+        })
     }
 
     fn flag_radius(&self) -> f64 {
         self.setup.shared.parameters().double("flag_radius_mm") / 1e3
     }
 
-    fn point_in_object(&self, clicked: &PointStamped) -> Result<Point3<f64>, String> {
+    pub(super) fn point_in_object(&self, clicked: &PointStamped) -> Result<Point3<f64>, String> {
         let stamp_ns = match stamp_ns(&clicked.header.stamp).ok_or("the stamp of the point is no time")? {
             0 => self.session.last_ns.unwrap_or_else(|| self.port.now_ns()),
             stamp_ns => stamp_ns,
@@ -134,6 +142,9 @@ impl RefinementWorker {
     }
 
     fn change_strokes(&mut self, request: &UndoRequest, is_undo: bool) -> UndoResponse {
+        if self.is_taking_out() {
+            return UndoResponse { message: BUSY.to_owned(), ..Default::default() };
+        }
         let wanted = request.strokes.clamp(1, MOST_STROKES);
         let (mut strokes, mut why) = (0, None);
         while strokes < wanted {
@@ -147,10 +158,9 @@ impl RefinementWorker {
                     break;
                 }
             }
-            let change = StrokeChange { after_ns: self.session.last_ns.unwrap_or(i64::MIN), is_undo };
-            if let Err(error) = self.session.recorder.write_stroke(change) {
-                warn!(%error, "after a crash this stroke would be as it was");
-            }
+            let after_ns = self.session.last_ns.unwrap_or(i64::MIN);
+            let exchange = Exchange { after_ns, stroke_ns: self.session.engine.changed_stroke_ns() };
+            self.note_stroke(if is_undo { StrokeChange::Undo(exchange) } else { StrokeChange::Redo(exchange) });
         }
         self.session.version += u64::from(strokes > 0);
         let verb = if is_undo { "took back" } else { "did again" };

@@ -26,6 +26,8 @@ mod setup;
 mod shared;
 mod side_work;
 mod streams;
+mod take_out;
+mod taking_out;
 mod tiles;
 mod tip;
 mod view;

@@ -23,6 +23,7 @@ use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
 use super::side_work::SideWork;
 use super::streams::StreamWatch;
+use super::take_out::TakingOut;
 use crate::haptic::RefineError;
 use crate::live::LiveError;
 use crate::ros::inbox::Arrivals;
@@ -98,6 +99,8 @@ pub struct RefinementWorker {
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
     pub(super) side_work: SideWork,
+    /// a touch that is being taken out or put back
+    pub(super) taking_out: Option<TakingOut>,
     pub(super) sampled: Instant,
     edits_sent: Instant,
     pub(super) tip_published: Instant,
@@ -123,6 +126,7 @@ impl RefinementWorker {
         Self {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
+            taking_out: None,
             doubts: InputDoubts::on(&setup.clock),
             resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
@@ -175,6 +179,7 @@ impl RefinementWorker {
         // it stops, retracts and ends while the session is written; who calls now is refused
         self.arm = None;
         drop(inbox);
+        self.give_up_taking_out("the node ends");
         self.end()
     }
 
@@ -380,6 +385,7 @@ impl RefinementWorker {
                     Err(error) => self.fail(&error),
                 }
             }
+            self.go_on_taking_out();
             self.send_edits();
             self.send_probed();
             self.retry_waiting();
@@ -398,6 +404,7 @@ impl RefinementWorker {
         (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
         // a change of the session before means nothing in this one
         self.doubts.restart();
+        self.give_up_taking_out("a new session has begun");
         self.kept = self.unsent.take().or(self.kept.take());
         std::mem::replace(&mut self.session, next)
     }

@@ -18,7 +18,7 @@ use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta}
 use crate::mesh::TriMesh;
 use crate::reconstruct::Patcher;
 use crate::ros::port::Port;
-use crate::session::{Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, Unrecorded};
+use crate::session::{Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, StrokeChanges, Unrecorded};
 use crate::stylus::{Synchroniser, WrenchFrame};
 
 /// What was refused and lost, and how long things took.
@@ -73,6 +73,8 @@ pub struct NodeSession {
     pub version: u64,
     /// … and edits at that time
     pub edits: u64,
+    /// strokes that were taken back, done again, taken out and put back
+    pub strokes: StrokeChanges,
     /// stamp of the newest sample, ns
     pub last_ns: Option<i64>,
     /// touches that the thread of the features had no room for
@@ -162,6 +164,7 @@ impl NodeSession {
             behind_lately: Latencies::new(),
             version: 1,
             edits: 0,
+            strokes: StrokeChanges::default(),
             last_ns: None,
             probed: TouchDelta::default(),
         })

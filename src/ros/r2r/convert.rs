@@ -178,6 +178,8 @@ mod tests {
             ResyncMeshResponse,
             UndoRequest,
             UndoResponse,
+            TakeOutTouchRequest,
+            TakeOutTouchResponse,
             ProbeFeatureRequest,
             ProbeFeatureResponse,
         );

@@ -3,4 +3,5 @@ mod cell;
 mod files;
 mod samples;
 mod stops;
+mod take_out;
 mod truth;

@@ -572,6 +572,21 @@ impl Refiner {
         self.contacts.friction()
     }
 
+    /// What decides about contacts here, before its first sample.
+    ///
+    /// # Errors
+    /// [`RefineError::Setting`].
+    pub fn fresh_contacts(&self) -> Result<ContactEstimator, RefineError> {
+        Ok(ContactEstimator::new(self.params.contact())?)
+    }
+
+    /// Lets another estimator decide about contacts from here on, as if it had from the first sample on. The mesh stays.
+    pub fn set_contacts(&mut self, contacts: ContactEstimator) {
+        self.counts.contacts = contacts.contacts();
+        self.contacts = contacts;
+        (self.begun, self.track) = (None, None);
+    }
+
     /// What was decided about the contact of the last sample; `None` before the first.
     pub fn contact(&self) -> Option<&ContactSample> {
         self.contacts.latest()

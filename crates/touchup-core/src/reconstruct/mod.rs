@@ -32,6 +32,7 @@ pub use evidence::contact_map::{ContactMap, GateParams, MeanContact, Verdict};
 pub use evidence::contact_uncertainty::{CalibrationParams, ContactSigma, UncertaintyParams};
 pub use evidence::outliers::{Outlier, Outliers};
 pub use evidence::point_evidence::{EvidenceParams, Source};
+pub use evidence::stroke_log::StrokeSpan;
 pub use evidence::touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
 pub use field::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey};
 pub use field::piecewise::{FieldParams, FieldScratch, FieldValue};

@@ -9,6 +9,7 @@
 
 mod detail;
 mod error;
+mod evidence_replay;
 mod gate;
 mod latency;
 mod probed;
@@ -22,6 +23,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 
 use detail::Detail;
 pub use error::LiveError;
+pub use evidence_replay::EvidenceReplay;
 pub use gate::{Gate, GateKeeper};
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
@@ -60,6 +62,12 @@ pub struct Engine {
     answered: Option<ContactSample>,
     /// `None`: the haptic update works on the scan itself
     detail: Option<Detail>,
+    /// of the patch beside the samples
+    patch_params: Option<PatcherParams>,
+    /// samples since [`Self::begin_replay`]
+    since_replay: Option<Vec<Sample>>,
+    /// touch-down of the stroke that was taken back or done again last, ns
+    changed_stroke_ns: Option<i64>,
 }
 
 /// What an [`Engine`] leaves behind.
@@ -108,6 +116,7 @@ impl Engine {
         let shared = if let Renewal::Beside { scan, .. } = &renewal { Some(scan) } else { None };
         let (working, detail) = Detail::of(mesh, shared, &mut refine).map_err(RefineError::from)?;
         let mut refiner = Refiner::new(working, refine)?;
+        let patch_params = patch.filter(|_| shared.is_some());
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
             (None, _) => Reconstruction::Without,
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
@@ -120,7 +129,7 @@ impl Engine {
                 Reconstruction::Beside(Box::new(Renewals::new(scans, patcher, pace, gate)?))
             }
         };
-        Ok(Self { refiner, patch, answered: None, detail })
+        Ok(Self { refiner, patch, answered: None, detail, patch_params, since_replay: None, changed_stroke_ns: None })
     }
 
     /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due: [`Self::answer`], then
@@ -143,6 +152,7 @@ impl Engine {
         self.follow()?;
         let update = self.refiner.push(sample)?;
         self.answered = self.refiner.contact().copied();
+        self.since_replay.iter_mut().for_each(|since| since.push(*sample));
         Ok(update)
     }
 
@@ -231,7 +241,7 @@ impl Engine {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn undo(&mut self) -> Result<bool, LiveError> {
-        self.change_strokes(Refiner::undo, Patcher::undo)
+        self.change_strokes(Refiner::undo, evidence_replay::undo)
     }
 
     /// Redoes the last undone stroke, as [`Patcher::redo`]. Returns whether there was anything.
@@ -239,20 +249,64 @@ impl Engine {
     /// # Errors
     /// As [`Self::catch_up`].
     pub fn redo(&mut self) -> Result<bool, LiveError> {
-        self.change_strokes(Refiner::redo, Patcher::redo)
+        self.change_strokes(Refiner::redo, evidence_replay::redo)
     }
 
     fn change_strokes(
         &mut self,
         of_refiner: fn(&mut Refiner) -> bool,
-        of_patcher: fn(&mut Patcher) -> bool,
+        of_patcher: fn(&mut Patcher) -> Option<i64>,
     ) -> Result<bool, LiveError> {
         self.follow()?;
-        match &mut self.patch {
-            Reconstruction::Without => Ok(of_refiner(&mut self.refiner)),
-            Reconstruction::AtEnd(patcher) => Ok(of_patcher(patcher)),
-            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, of_patcher),
-        }
+        self.changed_stroke_ns = match &mut self.patch {
+            Reconstruction::Without => {
+                self.changed_stroke_ns = None;
+                return Ok(of_refiner(&mut self.refiner));
+            }
+            Reconstruction::AtEnd(patcher) => of_patcher(patcher),
+            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, of_patcher)?,
+        };
+        Ok(self.changed_stroke_ns.is_some())
+    }
+
+    /// Touch-down of the stroke that the last call of [`Self::undo`] or [`Self::redo`] took back or did again, ns; `None` where it did
+    /// nothing, and without a patch.
+    pub fn changed_stroke_ns(&self) -> Option<i64> {
+        self.changed_stroke_ns
+    }
+
+    /// Begins to make the evidence again beside the samples: what is returned takes all samples so far but those to be left out, on any
+    /// thread, and comes back with [`Self::end_replay`]. Until then the samples are kept. `None` without a patch beside them.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
+    pub fn begin_replay(&mut self) -> Result<Option<EvidenceReplay>, LiveError> {
+        let Some(patch) = self.patch_params else { return Ok(None) };
+        self.follow()?;
+        let replay = EvidenceReplay::new(self.refiner.fresh_contacts()?, patch)?;
+        self.since_replay = Some(Vec::new());
+        Ok(Some(replay))
+    }
+
+    /// Evidence and estimates become those of `replay` and of the samples since it was begun, as if there had never been others; `None`
+    /// leaves them. The mesh follows with the next calls, see [`Self::is_replacing`]. Never waits for the patch.
+    ///
+    /// # Errors
+    /// [`LiveError::Stopped`].
+    pub fn end_replay(&mut self, replay: Option<EvidenceReplay>) -> Result<(), LiveError> {
+        self.follow()?;
+        let since = self.since_replay.take().unwrap_or_default();
+        let (Some(mut replay), Reconstruction::Beside(renewals)) = (replay, &mut self.patch) else { return Ok(()) };
+        since.iter().for_each(|sample| replay.push(sample));
+        let EvidenceReplay { contacts, patcher } = replay;
+        let last_ns = self.refiner.contact().map_or(i64::MIN, |contact| contact.tip.stamp_ns);
+        self.refiner.set_contacts(contacts);
+        renewals.replace(patcher, last_ns)
+    }
+
+    /// Whether the mesh does not show yet what [`Self::end_replay`] has put in place.
+    pub fn is_replacing(&self) -> bool {
+        self.renewals().is_some_and(|renewals| renewals.is_replacing)
     }
 
     /// A copy of the evidence of the patch from all samples so far, without its results: it comes when the thread

@@ -57,17 +57,29 @@ pub(super) struct PublishedList {
     last: Option<(i64, u32)>,
 }
 
+fn name(touch: &ProbedPoint) -> (i64, u32) {
+    (touch.stamp_ns, touch.stroke)
+}
+
 impl PublishedList {
     /// The message about the current list: the added touches, or the whole list after a removal.
     pub fn changes(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
-        let name = |touch: &ProbedPoint| (touch.stamp_ns, touch.stroke);
         let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;
         let kept = if is_longer { self.count } else { 0 };
-        self.count = touches.len();
-        self.last = touches.last().map(name);
         if kept == touches.len() && is_longer {
             return TouchDelta::default();
         }
+        self.publish(touches, kept)
+    }
+
+    /// The message about a list that has another history: all of it.
+    pub fn all(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
+        self.publish(touches, 0)
+    }
+
+    fn publish(&mut self, touches: &[ProbedPoint], kept: usize) -> TouchDelta {
+        self.count = touches.len();
+        self.last = touches.last().map(name);
         TouchDelta { kept, new: touches[kept..].to_vec() }
     }
 }

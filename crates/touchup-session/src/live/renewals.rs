@@ -69,6 +69,10 @@ pub(super) struct Renewals {
     delta: PatchDelta,
     /// … and whether all of it is in the mesh
     pub is_done: bool,
+    /// whether another patcher is to be put in place, and the mesh does not show it yet …
+    pub is_replacing: bool,
+    /// … and whether the change that was taken up last leads to it
+    has_replaced: bool,
     /// stamp up to which the mesh shows the touches, ns
     patched_until_ns: i64,
     /// whether the change that is due is known to be late
@@ -94,6 +98,8 @@ impl Renewals {
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
             is_done: true,
+            is_replacing: false,
+            has_replaced: false,
             patched_until_ns: i64::MIN,
             is_late: false,
             is_settled: true,
@@ -140,6 +146,7 @@ impl Renewals {
             self.is_done = refiner.go_on_following(&self.delta, most)?;
             if self.is_done {
                 self.patched_until_ns = self.delta.until_ns;
+                self.is_replacing &= !self.has_replaced;
             }
         }
         Ok(())
@@ -199,13 +206,24 @@ impl Renewals {
     pub fn change_strokes(
         &mut self,
         refiner: &mut Refiner,
-        change: fn(&mut Patcher) -> bool,
-    ) -> Result<bool, LiveError> {
+        change: fn(&mut Patcher) -> Option<i64>,
+    ) -> Result<Option<i64>, LiveError> {
         self.catch_up(refiner)?;
         self.is_settled = false;
         self.worker.ask(Question::ChangeStrokes(change))?;
         self.due_ns.push_back(i64::MAX);
         self.take_up_all(refiner)
+    }
+
+    /// Goes on with another patcher, which has all samples so far; as [`super::Engine::end_replay`].
+    ///
+    /// - `last_ns`: stamp of the last of them, whether or not that is left out.
+    pub fn replace(&mut self, patcher: Patcher, last_ns: i64) -> Result<(), LiveError> {
+        self.batch.clear();
+        self.worker.ask(Question::Replace(Box::new(patcher), last_ns))?;
+        self.due_ns.push_back(i64::MIN);
+        (self.is_replacing, self.is_settled) = (true, false);
+        Ok(())
     }
 
     /// Passes the samples on, for a change that is to be taken up at `due_ns`.
@@ -216,20 +234,22 @@ impl Renewals {
         Ok(())
     }
 
-    /// Takes up all requested changes as a whole; returns whether the last one was of strokes.
-    fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<bool, LiveError> {
+    /// Takes up all requested changes as a whole; returns the touch-down of the stroke that the last one was of.
+    fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<Option<i64>, LiveError> {
         self.go_on(refiner, usize::MAX)?;
-        let mut has_changed_strokes = false;
+        let mut changed_stroke_ns = None;
         while !self.due_ns.is_empty() {
             let answer = self.worker.answer()?;
-            has_changed_strokes = answer.has_changed_strokes;
+            changed_stroke_ns = answer.changed_stroke_ns;
             self.take_up(refiner, answer);
             self.go_on(refiner, usize::MAX)?;
         }
-        Ok(has_changed_strokes)
+        Ok(changed_stroke_ns)
     }
 
-    fn take_up(&mut self, refiner: &mut Refiner, WorkerAnswer { delta, at_rest, probed, .. }: WorkerAnswer) {
+    fn take_up(&mut self, refiner: &mut Refiner, answer: WorkerAnswer) {
+        let WorkerAnswer { delta, at_rest, probed, has_replaced, .. } = answer;
+        self.has_replaced = has_replaced;
         self.due_ns.pop_front();
         self.at_rest = at_rest;
         self.delta = delta;

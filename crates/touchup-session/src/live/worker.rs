@@ -24,7 +24,9 @@ pub(super) enum Question {
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and answer what changed
-    ChangeStrokes(fn(&mut Patcher) -> bool),
+    ChangeStrokes(fn(&mut Patcher) -> Option<i64>),
+    /// go on with another patcher, and answer what changed; the last sample of the one before has this stamp, ns
+    Replace(Box<Patcher>, i64),
 }
 
 /// Answers of the thread.
@@ -33,8 +35,10 @@ pub(super) struct WorkerAnswer {
     /// the patch of all touches on the scan that is shown, where that is another
     pub at_rest: Option<PatchDelta>,
     pub probed: TouchDelta,
-    /// whether there was a stroke to take back, or to do again
-    pub has_changed_strokes: bool,
+    /// touch-down of the stroke that was taken back or done again, if there was one, ns
+    pub changed_stroke_ns: Option<i64>,
+    /// whether another patcher was put in place
+    pub has_replaced: bool,
     /// to be filled again
     batch: Vec<ContactSample>,
 }
@@ -68,7 +72,7 @@ impl Worker {
             let mut published = PublishedList::default();
             let PatchedScans { working: scan, shown } = scans;
             for (question, _working) in inbox {
-                let (mut batch, mut has_changed_strokes) = (Vec::new(), false);
+                let (mut batch, mut changed_stroke_ns, mut has_replaced) = (Vec::new(), None, false);
                 let is_renewal = matches!(question, Question::Renew(_));
                 let settles = matches!(question, Question::Settle);
                 match question {
@@ -87,7 +91,12 @@ impl Worker {
                     }
                     Question::Flush => patcher.flush(),
                     Question::Settle => {}
-                    Question::ChangeStrokes(change) => has_changed_strokes = change(&mut patcher),
+                    Question::ChangeStrokes(change) => changed_stroke_ns = change(&mut patcher),
+                    Question::Replace(next, last_ns) => {
+                        let before = std::mem::replace(&mut patcher, *next);
+                        patcher.take_over(before, last_ns);
+                        has_replaced = true;
+                    }
                 }
                 let mut at_rest = None;
                 let delta = match &shown {
@@ -100,8 +109,10 @@ impl Worker {
                         nothing
                     }
                 };
-                let probed = published.changes(patcher.probed());
-                if to_engine.send(WorkerAnswer { delta, at_rest, probed, has_changed_strokes, batch }).is_err() {
+                let touches = patcher.probed();
+                let probed = if has_replaced { published.all(touches) } else { published.changes(touches) };
+                let answer = WorkerAnswer { delta, at_rest, probed, changed_stroke_ns, has_replaced, batch };
+                if to_engine.send(answer).is_err() {
                     break;
                 }
                 if is_renewal {

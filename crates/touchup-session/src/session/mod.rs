@@ -6,7 +6,11 @@
 mod outcome;
 mod outliers;
 mod record;
+mod remade;
+mod strokes;
 
 pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
 pub use outliers::UncertaintySummary;
-pub use record::{SessionError, SessionRecord, SessionRecorder, StrokeChange, Unrecorded};
+pub use record::{SessionError, SessionRecord, SessionRecorder, Unrecorded};
+pub use remade::{EvidenceSource, RemakeError};
+pub use strokes::{Exchange, StrokeChange, StrokeChanges, StrokeReplay};

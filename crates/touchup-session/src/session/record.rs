@@ -1,4 +1,4 @@
-//! The record of a session, which reproduces its result: scene, scan, recording, and the undone strokes.
+//! The record of a session, which reproduces its result: scene, scan, recording, and the changes of strokes.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use super::strokes::{StrokeChange, StrokeChanges};
 use crate::clock::{Clock, locked};
 use touchup_core::stylus::Message;
 use touchup_io::mesh_file::MeshUnit;
@@ -55,15 +56,6 @@ pub enum SessionError {
     },
 }
 
-/// A stroke taken back, or done again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StrokeChange {
-    /// after the sample of this stamp, ns
-    pub after_ns: i64,
-    /// taken back; else done again
-    pub is_undo: bool,
-}
-
 #[derive(Debug, Serialize, Deserialize)]
 struct Description {
     scan: PathBuf,
@@ -86,8 +78,8 @@ pub struct SessionRecord {
     pub recording: PathBuf,
     /// its topics
     pub topics: Topics,
-    /// in order of time
-    pub strokes: Vec<StrokeChange>,
+    /// what was taken back, done again, taken out and put back
+    pub strokes: StrokeChanges,
 }
 
 impl SessionRecord {
@@ -134,7 +126,7 @@ impl SessionRecord {
 }
 
 /// A last line that a crash cut off was not done either.
-fn read_strokes(path: &Path) -> Result<Vec<StrokeChange>, SessionError> {
+fn read_strokes(path: &Path) -> Result<StrokeChanges, SessionError> {
     let text = read_text(path).map_err(io_error(path))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
     whole.lines().map(|line| parsed(line, path)).collect()
@@ -160,7 +152,7 @@ pub struct Unrecorded {
 #[derive(Debug)]
 pub struct SessionRecorder {
     folder: SessionFolder,
-    sender: SyncSender<(Message, &'static str)>,
+    sender: SyncSender<Note>,
     thread: JoinHandle<()>,
     unrecorded: Arc<Mutex<Unrecorded>>,
     end: Arc<RecordingEnd>,
@@ -202,17 +194,31 @@ impl SessionRecorder {
 
     /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
     pub fn write(&self, message: Message, frame: &'static str) {
-        if self.sender.try_send((message, frame)).is_err() {
+        if self.sender.try_send(Note::Message(message, frame)).is_err() {
             locked(&self.unrecorded).messages += 1;
         }
     }
 
-    /// Takes down that a stroke was taken back or done again.
+    /// The folder that the messages go into.
+    pub fn recording(&self) -> PathBuf {
+        self.folder.path().join(RECORDING)
+    }
+
+    /// Something comes once all is on the disk that was written until now; nothing ever where the disk refuses it, or where there is no
+    /// room to wait.
+    pub fn flushed(&self) -> Receiver<()> {
+        let (to, flushed) = sync_channel(1);
+        // dropped where there is no room, which the receiver sees
+        let _ = self.sender.try_send(Note::Flush(to));
+        flushed
+    }
+
+    /// Takes down that a stroke was taken back, done again, taken out or put back.
     ///
     /// # Errors
     /// [`SessionError::Io`].
     pub fn write_stroke(&self, change: StrokeChange) -> Result<(), SessionError> {
-        let line = serde_json::to_string(&change).expect("a number and a truth value cannot fail");
+        let line = serde_json::to_string(&change).expect("a name and numbers cannot fail");
         self.folder.append_line(STROKES, &line).map_err(io_error(&self.folder.path().join(STROKES)))
     }
 
@@ -241,6 +247,14 @@ fn io_error(path: &Path) -> impl FnOnce(io::Error) -> SessionError {
     |source| SessionError::Io { path: path.to_owned(), source }
 }
 
+/// What goes to the thread of the recorder.
+enum Note {
+    /// a message whose header names this frame
+    Message(Message, &'static str),
+    /// say when all before this is on the disk
+    Flush(SyncSender<()>),
+}
+
 struct Taker {
     writer: SegmentedWriter,
     shared: Arc<Mutex<Unrecorded>>,
@@ -253,21 +267,30 @@ impl Taker {
     /// Polls the queue: a wake-up for each message would cost the sender more than the message.
     ///
     /// Messages of a failed write are lost; writing is retried later, as space may be freed.
-    fn take_down(mut self, messages: &Receiver<(Message, &'static str)>) {
+    fn take_down(mut self, messages: &Receiver<Note>) {
         loop {
             drop(
                 self.clock
                     .wait_while(&self.end.changed, locked(&self.end.has_come), FLUSH_EVERY, |has_come| !*has_come),
             );
+            let mut waiting = Vec::new();
             let is_over = loop {
                 match messages.try_recv() {
-                    Ok((message, frame)) => self.take(&message, frame),
+                    Ok(Note::Message(message, frame)) => self.take(&message, frame),
+                    Ok(Note::Flush(to)) => waiting.push(to),
                     Err(why) => break why == TryRecvError::Disconnected,
                 }
             };
             match self.writer.flush() {
-                Ok(0) => {}
-                Ok(_) => self.accept(),
+                Ok(count) => {
+                    if count > 0 {
+                        self.accept();
+                    }
+                    // who does not wait any more is gone
+                    for to in waiting {
+                        let _ = to.send(());
+                    }
+                }
                 Err(error) => self.refuse(0, &error),
             }
             if is_over {

@@ -11,6 +11,7 @@ pub(in crate::reconstruct) mod outliers;
 pub(in crate::reconstruct) mod point_evidence;
 pub(in crate::reconstruct) mod probed_log;
 pub(in crate::reconstruct) mod scan_distance;
+pub(in crate::reconstruct) mod stroke_log;
 pub(in crate::reconstruct) mod touch_history;
 pub(in crate::reconstruct) mod touches;
 pub(in crate::reconstruct) mod voxel_set;

@@ -8,6 +8,7 @@ use crate::reconstruct::evidence::double_contact::{is_mixed, split};
 use crate::reconstruct::evidence::free_space::FreeSpace;
 use crate::reconstruct::evidence::probed_log::ProbedLog;
 use crate::reconstruct::evidence::scan_distance::ScanDistance;
+use crate::reconstruct::evidence::stroke_log::StrokeLog;
 use crate::reconstruct::evidence::touches::TipTouch;
 use crate::reconstruct::field::grid::GridChanges;
 use crate::reconstruct::incremental::history::Direction;
@@ -33,6 +34,7 @@ pub(in crate::reconstruct) struct TouchHistory {
     pub contacts: ContactMap,
     pub free_space: FreeSpace,
     pub probed: ProbedLog,
+    pub stroke_log: StrokeLog,
     /// whether where the tip went counts; else `free_space` stays empty
     pub keeps_free_space: bool,
     /// size of the tip, m
@@ -48,7 +50,8 @@ pub(in crate::reconstruct) struct TouchHistory {
 
 impl TouchHistory {
     pub fn keep(&mut self, touch: &TipTouch) {
-        self.until_ns = touch.stamp_ns;
+        self.note_until(touch.stamp_ns);
+        self.stroke_log.note(touch.stamp_ns, touch.state);
         let place = TipPlace { centre: touch.centre, axis: touch.axis };
         let is_between_strokes =
             self.last_contact_ns.is_none_or(|last| touch.stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS);
@@ -64,6 +67,7 @@ impl TouchHistory {
             self.free_space.begin_stroke();
             self.probed.begin_stroke();
         }
+        self.stroke_log.note_contact(touch.stamp_ns, is_between_strokes);
         self.last_contact_ns = Some(touch.stamp_ns);
         let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
         let mut is_accepted = false;
@@ -84,6 +88,11 @@ impl TouchHistory {
         }
     }
 
+    /// What was touched up to this stamp is known, ns; never less than before.
+    pub fn note_until(&mut self, stamp_ns: i64) {
+        self.until_ns = self.until_ns.max(stamp_ns);
+    }
+
     fn sweep(&mut self, place: &TipPlace) {
         if self.keeps_free_space {
             self.free_space.add_place(place);
@@ -102,6 +111,7 @@ impl TouchHistory {
         let has_changed = is_possible && self.contacts.exchange(direction) && self.free_space.exchange(direction);
         if has_changed {
             self.probed.exchange(direction);
+            self.stroke_log.exchange(direction);
         }
         has_changed
     }

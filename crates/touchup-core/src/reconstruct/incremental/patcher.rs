@@ -14,6 +14,7 @@ use crate::reconstruct::evidence::kept_detail::KeptDetail;
 use crate::reconstruct::evidence::outliers::Outliers;
 use crate::reconstruct::evidence::point_evidence::{Evidence, EvidenceParams};
 use crate::reconstruct::evidence::probed_log::ProbedLog;
+use crate::reconstruct::evidence::stroke_log::{StrokeLog, StrokeSpan};
 use crate::reconstruct::evidence::touch_history::TouchHistory;
 use crate::reconstruct::evidence::touches::{TipTouch, TouchFinder, TouchFinderParams};
 use crate::reconstruct::field::grid::{GridChanges, nodes_around_contact, nodes_around_contacts};
@@ -242,6 +243,7 @@ impl Patcher {
                 contacts: ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
                 free_space: FreeSpace::new(body, SWEPT_CELL * radius, 5.0 / 3.0 * radius),
                 probed: ProbedLog::new(params.ball()),
+                stroke_log: StrokeLog::default(),
                 keeps_free_space: params.free_space,
                 radius,
                 ball: params.ball(),
@@ -309,6 +311,19 @@ impl Patcher {
         self.history.strokes()
     }
 
+    /// The samples of a stroke that counts.
+    ///
+    /// - `number`: as in [`ProbedPoint::stroke`].
+    pub fn stroke(&self, number: u32) -> Option<StrokeSpan> {
+        self.history.stroke_log.span(number as usize)
+    }
+
+    /// The samples of the last stroke that counts.
+    pub fn last_stroke(&self) -> Option<StrokeSpan> {
+        let log = &self.history.stroke_log;
+        log.span(log.count().checked_sub(1)?)
+    }
+
     /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
     /// there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
@@ -317,9 +332,26 @@ impl Patcher {
     }
 
     /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
-    /// one.
+    /// one. What is still in the smoothing window is taken in first, as by [`Self::undo`].
     pub fn redo(&mut self) -> bool {
+        self.flush();
         self.exchange(Direction::Redo)
+    }
+
+    /// Goes on in the place of another patcher of the same scan, whose mesh follows: its next change leads from that mesh to what this
+    /// one has kept.
+    ///
+    /// - `until_ns`: stamp of the last sample of either: what that mesh shows up to there goes.
+    pub fn take_over(&mut self, before: Self, until_ns: i64) {
+        let Self { live, is_closed, history: TouchHistory { bounds, .. }, .. } = before;
+        self.live = live.map(|live| LivePatch {
+            remesh: live.remesh,
+            published: live.published,
+            is_outdated: true,
+            ..LivePatch::default()
+        });
+        (self.is_closed, self.history.bounds) = (is_closed, bounds);
+        self.history.note_until(until_ns);
     }
 
     /// The next renewal remeshes everything where a stroke was exchanged; returns whether one was.
@@ -546,7 +578,7 @@ fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
     if params.region.is_none_or(|region| region.contains(&touch.centre)) {
         history.keep(touch);
     } else {
-        history.until_ns = touch.stamp_ns;
+        history.note_until(touch.stamp_ns);
     }
 }
 

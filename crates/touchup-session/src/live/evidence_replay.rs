@@ -1,0 +1,58 @@
+//! The evidence of samples alone, without a mesh: made again, some samples can be left out.
+
+use touchup_core::reconstruct::{Patcher, PatcherParams};
+use touchup_core::stylus::{ContactEstimator, Sample, SettingError};
+
+/// Takes samples as an [`super::Engine`] does, and moves no mesh.
+#[derive(Clone, Debug)]
+pub struct EvidenceReplay {
+    pub(super) contacts: ContactEstimator,
+    pub(super) patcher: Patcher,
+}
+
+impl EvidenceReplay {
+    /// Nothing touched yet.
+    ///
+    /// - `contacts`: that has taken no sample.
+    ///
+    /// # Errors
+    /// [`SettingError`] of the patch.
+    pub(super) fn new(contacts: ContactEstimator, patch: PatcherParams) -> Result<Self, SettingError> {
+        Ok(Self { contacts, patcher: Patcher::new(patch)? })
+    }
+
+    /// Takes the next sample; one that is refused changes nothing.
+    pub fn push(&mut self, sample: &Sample) {
+        if let Ok(contact) = self.contacts.observe(sample) {
+            self.patcher.push(contact);
+        }
+    }
+
+    /// Takes the last stroke back; returns its touch-down, ns, `None` where there was none.
+    pub fn undo(&mut self) -> Option<i64> {
+        undo(&mut self.patcher)
+    }
+
+    /// Does the stroke again that was taken back last; returns its touch-down, ns, `None` where there was none.
+    pub fn redo(&mut self) -> Option<i64> {
+        redo(&mut self.patcher)
+    }
+
+    /// What was kept.
+    pub fn patcher(&self) -> &Patcher {
+        &self.patcher
+    }
+}
+
+/// As [`EvidenceReplay::undo`].
+pub(super) fn undo(patcher: &mut Patcher) -> Option<i64> {
+    // the last stroke may still be in the smoothing window
+    patcher.flush();
+    let last = patcher.last_stroke();
+    last.filter(|_| patcher.undo()).map(|stroke| stroke.from_ns)
+}
+
+/// As [`EvidenceReplay::redo`].
+pub(super) fn redo(patcher: &mut Patcher) -> Option<i64> {
+    patcher.redo().then(|| patcher.last_stroke()).flatten().map(|stroke| stroke.from_ns)
+}
