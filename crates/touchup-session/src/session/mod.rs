@@ -9,4 +9,4 @@ mod record;
 
 pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
 pub use outliers::UncertaintySummary;
-pub use record::{SessionError, SessionRecord, SessionRecorder, StrokeChange, Unrecorded};
+pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, StrokeChange, Unrecorded};
