@@ -145,7 +145,8 @@ fn beside_pages(faces: usize, turns: usize) {
             let address = ([127, 0, 0, 1], 0).into();
             let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
-            let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal: None };
+            let (scan_mesh, mesh_unit) = (ready.scan_mesh(), ready.mesh_unit());
+            let facts = NodeFacts { scan, scan_mesh, session_folder, nominal: None, nominal_file: None, mesh_unit };
             let (port, page) = start(&params, facts, inbox, ready.whole_mesh(), port, |_| ()).expect("a port is free");
             let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
             let _stuck = match kind {

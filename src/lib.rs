@@ -13,7 +13,7 @@
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
 //! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`live`], [`session`] |
 //! | `touchup-report` | a program of its own: error against run time, stability, and what each part costs |
-//! | this one | `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
+//! | this one | `inspection`: a part against its drawing; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 /// The method as docs/method.md has it; its code is tested.
@@ -28,6 +28,7 @@ pub use touchup_session::{clock, live, replay, scan, scene, session, threads};
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
+mod inspection;
 pub mod log_lines;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub mod ros;

@@ -90,11 +90,6 @@ impl CliError {
         Self::new(("calibration", 3), format!("{}: {error}", path.display()), None)
     }
 
-    /// A file that an inspection rests on and that cannot be read.
-    pub fn inspected(path: &Path, error: io::Error) -> Self {
-        Self::new(("inspection", 3), format!("{}: {error}", path.display()), Some(&error))
-    }
-
     /// What an arm, or its work, came to.
     pub fn arm(error: impl Display) -> Self {
         Self::new(("arm", 1), error, None)

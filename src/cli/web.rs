@@ -101,7 +101,8 @@ impl WebFlags {
         let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, ready.mesh_unit()));
         let nominal = nominal.transpose().map_err(CliError::truth)?.map(|scan| scan.mesh);
-        let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal };
+        let (nominal_file, mesh_unit) = (self.web_nominal.clone(), ready.mesh_unit());
+        let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal, nominal_file, mesh_unit };
         let by_link = self.web_links || !address.ip().is_loopback();
         let params = WebParams { address, names: self.web_name.clone(), by_link, certificate };
         let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;

@@ -35,6 +35,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io scan replay"),
+    ("inspection", "numeric stylus mesh features conformity compare io scan scene session"),
     (
         "report",
         "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",
@@ -43,13 +44,13 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scan scene session",
+         calibrate compare diagnose io scan scene session conformity inspection",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay ros ros2_control ur",
+         calibrate compare diagnose io threads scan scene session replay inspection ros ros2_control ur",
     ),
 ];
 

@@ -1,4 +1,4 @@
-/** The bar of what an operator does all the time: undo, redo, pause, save, new session, sessions. */
+/** The bar of what an operator does all the time: undo, redo, pause, save, new session, report, sessions. */
 import { ask, button, el, picture, say } from "./dom";
 import { t } from "./language";
 import type { Answer } from "./messages";
@@ -17,6 +17,7 @@ export class Controls {
     private readonly model: Model,
     private readonly operating: Operating,
     showSessions: () => void,
+    showReport: () => void,
   ) {
     const undo = button("undo", "undo", () => void operating.call("~/undo", { strokes: 1 }));
     const redo = button("redo", "redo", () => void operating.call("~/redo", { strokes: 1 }));
@@ -24,8 +25,9 @@ export class Controls {
     const save = button("save", "save", () => void this.save());
     const fresh = button("fresh", "newSession", () => void this.begin());
     const sessions = button("sessions", "sessions", showSessions);
+    const report = button("report", "report", showReport);
     for (const each of [undo, redo, this.pause, save, fresh]) operating.guard(each);
-    this.element.append(undo, redo, this.pause, save, fresh, sessions);
+    this.element.append(undo, redo, this.pause, save, fresh, report, sessions);
     model.on(["state"], () => this.show());
   }
 

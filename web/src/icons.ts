@@ -26,6 +26,7 @@ export const ICONS = {
   stop: "M7 7h10v10H7z",
   search: "M10.5 4a6.5 6.5 0 1 0 0 13 6.5 6.5 0 0 0 0-13M15.5 15.5 20 20",
   takeOut: "M4 8c3-4 6 4 9 0M4 18h9M16 10l5 5M21 10l-5 5",
+  report: "M6 3h9l4 4v14H6zM9 12h7M9 16h7M14 3v5h5",
   sheet: "M7 14l5-5 5 5",
 } as const;
 

@@ -18,6 +18,8 @@ export interface State {
   session: string;
   is_paused: boolean;
   scan: { file: string; faces: number };
+  /** Its file, where the node has one. */
+  nominal_part: string | null;
   arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts"; stays_because?: string | null };
   clients: number;
 }

@@ -65,14 +65,14 @@ export function buildPage(connection: Connection): void {
   const details = new FeatureDetails(model, operating);
   const guidance = new Guidance(model, () => list.show(), lookAt);
   const arm = new ArmPanel(model, operating, (isHeld) => (picture.stage.leastInterval = isHeld ? CALM : 0));
-  const sessions = new Sessions(notices);
+  const sessions = new Sessions(model, operating, notices);
   const legend = new Legend(store, picture.mesh, picture.stage);
   const force = new ForceBar();
   const loading = el("p", { class: "loading", attributes: { role: "status" } });
   const setup = new Setup(model, store, picture.tip.state);
   const share = new Share(operating);
   const status = new StatusBar(model, () => picture.theme(), () => setup.open(), () => share.show());
-  const controls = new Controls(model, operating, () => void sessions.show());
+  const controls = new Controls(model, operating, () => void sessions.show(), () => void sessions.showReport());
   layOut();
 
   model.on(["features", "selected"], showFeatures);
@@ -93,7 +93,7 @@ export function buildPage(connection: Connection): void {
     const panel = el("aside", { class: "panel", label: "panel" }, sheet, scroll, arm.element);
     panel.removeAttribute("title");
     const main = el("main", { class: "main" }, picture.element, controls.element);
-    document.body.append(status.element, status.remedy, el("div", { class: "work" }, main, panel), sessions.element, share.element);
+    document.body.append(status.element, status.remedy, el("div", { class: "work" }, main, panel), sessions.element, sessions.report.element, share.element);
   }
 
   /** Says why the buttons rest. */

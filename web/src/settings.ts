@@ -13,9 +13,11 @@ export interface Settings {
   showsAll: boolean;
   /** Scan whose size and place somebody has looked at here. */
   checkedScan: string;
+  /** Who made the last report here. */
+  operator: string;
 }
 
-const DEFAULTS: Settings = { language: "", theme: "auto", colourBy: "support", tolerance: 0.02e-3, showsAll: false, checkedScan: "" };
+const DEFAULTS: Settings = { language: "", theme: "auto", colourBy: "support", tolerance: 0.02e-3, showsAll: false, checkedScan: "", operator: "" };
 
 export const settings: Settings = read();
 

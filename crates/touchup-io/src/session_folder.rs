@@ -50,6 +50,19 @@ impl SessionFolder {
         Err(io::Error::from(io::ErrorKind::AlreadyExists))
     }
 
+    /// One that is there, which somebody else named.
+    ///
+    /// # Errors
+    /// Whatever the system reports, and names that could lead elsewhere.
+    pub fn open(parent: &Path, name: &str) -> io::Result<Self> {
+        let path = parent.join(name);
+        // a link may lead anywhere
+        if !is_plain_name(name) || !fs::symlink_metadata(&path).is_ok_and(|there| there.is_dir()) {
+            return Err(io::Error::new(io::ErrorKind::NotFound, "there is no session of this name"));
+        }
+        Ok(Self { path, name: name.to_owned() })
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
@@ -101,6 +114,57 @@ impl SessionFolder {
         let mut file = OpenOptions::new().create(true).append(true).open(self.path.join(name))?;
         file.write_all(format!("{line}\n").as_bytes())?;
         file.sync_data()
+    }
+}
+
+/// What the folders of files that are handed in begin with: hidden, so that nobody lists or reads them.
+const HANDED_IN: &str = ".upload-";
+
+/// A file that somebody hands in piece by piece: in a hidden folder of a session, for as long as this is.
+#[derive(Debug)]
+pub struct HandedIn {
+    file: File,
+    path: PathBuf,
+    room: u64,
+    /// removes both when it is dropped
+    _folder: tempfile::TempDir,
+}
+
+impl HandedIn {
+    /// An empty one; what a process that was killed has left there goes.
+    ///
+    /// - `name`: as it is called where it comes from.
+    /// - `most`: bytes that it may have.
+    ///
+    /// # Errors
+    /// Whatever the system reports, and names that could lead elsewhere.
+    pub fn new(session: &SessionFolder, name: &str, most: u64) -> io::Result<Self> {
+        if !is_plain_name(name) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, PlaceError::NotAPlainName(name.to_owned())));
+        }
+        for left in fs::read_dir(session.path())?.filter_map(Result::ok) {
+            if left.file_name().to_string_lossy().starts_with(HANDED_IN) && left.file_type()?.is_dir() {
+                fs::remove_dir_all(left.path())?;
+            }
+        }
+        let folder = tempfile::Builder::new().prefix(HANDED_IN).tempdir_in(session.path())?;
+        let path = folder.path().join(name);
+        Ok(Self { file: File::create_new(&path)?, path, room: most, _folder: folder })
+    }
+
+    /// Adds a piece.
+    ///
+    /// # Errors
+    /// Whatever the system reports; [`io::ErrorKind::FileTooLarge`] for more than it may have.
+    pub fn add(&mut self, piece: &[u8]) -> io::Result<()> {
+        let left = self.room.checked_sub(piece.len() as u64);
+        self.room = left.ok_or_else(|| io::Error::new(io::ErrorKind::FileTooLarge, "the file is too large"))?;
+        self.file.write_all(piece)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 }
 
@@ -249,6 +313,37 @@ mod tests {
             files: files.iter().map(|&file| file.to_owned()).collect(),
         };
         assert_eq!(listed, [session("two", 6, &["a.ply", "b.json"]), session("one", 3, &["a.ply"])]);
+    }
+
+    #[test]
+    fn what_is_handed_in_has_its_name_and_its_limit_and_goes_with_who_took_it() {
+        let folder = sessions();
+        let session = SessionFolder::open(folder.path(), "two").unwrap();
+        let left = session.path().join(".upload-left");
+        fs::create_dir(&left).unwrap();
+        let mut file = HandedIn::new(&session, "part.stl", 5).unwrap();
+        assert!(!left.exists(), "what another one left is gone");
+        file.add(b"abc").unwrap();
+        file.add(b"de").unwrap();
+        assert_eq!(file.add(b"f").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(fs::read(file.path()).unwrap(), b"abcde");
+        assert!(file.path().ends_with("part.stl") && file.path().starts_with(session.path()));
+        assert_eq!(list_sessions(folder.path()).unwrap()[0].files, ["a.ply", "b.json"], "nobody lists it");
+        let path = file.path().to_owned();
+        drop(file);
+        assert!(!path.exists() && !path.parent().unwrap().exists());
+        for name in ["../part.stl", "/etc/passwd", "", ".hidden", "a\0b", "a/b"] {
+            assert!(HandedIn::new(&session, name, 5).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn only_sessions_in_the_folder_are_opened() {
+        let folder = sessions();
+        assert_eq!(SessionFolder::open(folder.path(), "one").unwrap().path(), folder.path().join("one"));
+        for name in ["linked", ".hidden", "..", "", "one/", "one/../two", "/etc", "notes.txt", "missing"] {
+            assert!(SessionFolder::open(folder.path(), name).is_err(), "{name}");
+        }
     }
 
     #[test]

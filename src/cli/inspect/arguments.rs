@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::drawing::DrawingFlags;
-use super::source::InspectionSource;
 use crate::cli::pictures::view_from;
 use crate::cli::progress::WorkProgress;
-use crate::cli::{CliError, check_outputs, require, require_positive};
-use crate::conformity::{DecisionRule, GeneralTolerance};
+use crate::cli::{CliError, check_outputs};
+use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
+use crate::inspection::{DrawingParams, InspectionParams, InspectionSource, ReportFiles};
 use crate::io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
@@ -33,7 +32,7 @@ pub(in crate::cli) struct InspectArguments {
     #[arg(long, value_name = "D")]
     pub position_mm: Option<f64>,
     /// A feature is the nominal one where its centre is no farther off than this across its axis, mm
-    #[arg(long, value_name = "R", default_value_t = 1.5)]
+    #[arg(long, value_name = "R", default_value_t = InspectionParams::default().match_mm)]
     pub match_mm: f64,
     /// Writes nominal values to be edited, CSV or JSON, from the CAD mesh of --nominal or else from FEATURES; inspects nothing
     #[arg(long, value_name = "FILE")]
@@ -51,13 +50,13 @@ pub(in crate::cli) struct InspectArguments {
     #[arg(long, value_name = "YAML")]
     pub scene: Option<PathBuf>,
     /// How it is decided: guard bands, or the measured value alone
-    #[arg(long, value_name = "RULE", value_parser = rule, default_value = DecisionRule::GuardBands.name())]
+    #[arg(long, value_name = "RULE", value_parser = rule, default_value = DecisionParams::default().rule.name())]
     pub rule: DecisionRule,
     /// Probability of conformity that a pass needs, and of nonconformity that a fail needs
-    #[arg(long, value_name = "P", default_value_t = 0.95)]
+    #[arg(long, value_name = "P", default_value_t = DecisionParams::default().confidence)]
     pub confidence: f64,
     /// Coverage factor of the expanded uncertainties U = k u
-    #[arg(long, value_name = "K", default_value_t = 2.0)]
+    #[arg(long, value_name = "K", default_value_t = InspectionParams::default().coverage_factor)]
     pub k: f64,
     /// Name or number of the part
     #[arg(long, value_name = "NAME")]
@@ -102,29 +101,38 @@ impl InspectArguments {
         let ending = if is_xml { ".xml" } else { ".qif" };
         check_outputs(&[("--qif", ending, &self.qif)], &inputs, "read: choose another place")?;
         check_outputs(&[("--write-nominal", "", &self.write_nominal)], &inputs, "read: choose another place")?;
-        require_positive("--k", self.k)?;
-        require_positive("--match-mm", self.match_mm)?;
-        self.tolerance_mm.map_or(Ok(()), |tolerance| require_positive("--tolerance-mm", tolerance))?;
-        self.position_mm.map_or(Ok(()), |position| require_positive("--position-mm", position))?;
-        let is_more_than_even = self.confidence > 0.5 && self.confidence < 1.0;
-        require(is_more_than_even, format_args!("--confidence {} must be above 0.5 and below 1", self.confidence))?;
+        self.params().check()?;
         view_from(self.view.as_ref()).map(drop)
     }
 
-    /// What they say of the drawing.
-    pub(super) fn drawing_flags(&self) -> DrawingFlags {
-        DrawingFlags {
-            unit: self.nominal_unit,
-            general: self.general,
-            tolerance_mm: self.tolerance_mm,
-            position_mm: self.position_mm,
+    /// How it is inspected.
+    pub(super) fn params(&self) -> InspectionParams {
+        InspectionParams {
+            drawing: DrawingParams {
+                unit: self.nominal_unit,
+                general: self.general,
+                tolerance_mm: self.tolerance_mm,
+                position_mm: self.position_mm,
+            },
+            decision: DecisionParams { rule: self.rule, confidence: self.confidence },
+            coverage_factor: self.k,
+            match_mm: self.match_mm,
+            part: self.part.clone(),
+            serial: self.serial.clone(),
+            operator: self.operator.clone(),
         }
+    }
+
+    /// Where the report goes; JSON goes to stdout.
+    pub(super) fn files(&self) -> ReportFiles {
+        ReportFiles { html: self.out.clone(), csv: self.csv.clone(), json: None, qif: self.qif.clone() }
     }
 
     /// Reads what was measured.
     pub(super) fn source(&self) -> Result<InspectionSource, CliError> {
         let _reading = WorkProgress::stage("read");
-        InspectionSource::read(&self.features, [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()])
+        let named = [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()];
+        Ok(InspectionSource::read(&self.features, named)?)
     }
 }
 

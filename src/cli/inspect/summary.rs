@@ -2,6 +2,7 @@
 
 use crate::cli::{Losses, counted};
 use crate::conformity::Decision;
+use crate::inspection::{first_few, percent};
 use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
 
 /// The table that is printed.
@@ -36,11 +37,6 @@ pub(super) fn in_words(record: &InspectionRecord) -> String {
     lines.join("\n")
 }
 
-/// A share in percent, with the digits that it has.
-pub(super) fn percent(share: f64) -> f64 {
-    (share * 1e6).round() / 1e4
-}
-
 fn row(one: &CharacteristicRecord, width: usize) -> String {
     let number = |name: &str| one.number(name).map_or_else(|| "-".to_owned(), |number| format!("{number:.3}"));
     let limits = format!("{} … {}", number("lower_limit"), number("upper_limit"));
@@ -56,18 +52,6 @@ fn row(one: &CharacteristicRecord, width: usize) -> String {
         number("nominal"),
         one.decision
     )
-}
-
-/// Most names in a line.
-const MOST_NAMED: usize = 8;
-
-/// The first names, and how many more there are.
-pub(super) fn first_few(names: &[String], between: &str) -> String {
-    let shown = names.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(between);
-    match names.len().saturating_sub(MOST_NAMED) {
-        0 => shown,
-        more => format!("{shown}{between}and {more} more"),
-    }
 }
 
 /// What was not proved to conform, in one line; empty: all was.

@@ -141,9 +141,10 @@ impl NodeSession {
     pub fn begin(setup: &Setup) -> Result<Self, NodeError> {
         let parameters = setup.shared.parameters();
         let parent = PathBuf::from(parameters.string("session_folder"));
-        let folder = SessionFolder::create(&parent, &name_of(SystemTime::now()))
+        let begun = SystemTime::now();
+        let folder = SessionFolder::create(&parent, &name_of(begun))
             .map_err(|source| NodeError::Folder { path: parent, source })?;
-        SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics)?;
+        SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics, begun)?;
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
         let axes = WrenchFrame::default();
         let engine = engine_of(setup, axes)?;

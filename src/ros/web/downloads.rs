@@ -7,6 +7,7 @@ use futures_util::{Stream, stream};
 use serde_json::{Value, json};
 
 use crate::io::session_folder::{ListedSession, list_sessions};
+use crate::session::SessionFacts;
 
 /// Bytes that are read at a time.
 const PIECE: usize = 256 << 10;
@@ -16,7 +17,15 @@ const PIECE: usize = 256 << 10;
 /// - `current`: name of the session that runs.
 pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
     let listed = list_sessions(folder)?;
-    let shown = |ListedSession { name, bytes, files }: ListedSession| json!({ "is_current": name == current, "name": name, "bytes": bytes, "files": files });
+    let shown = |ListedSession { name, bytes, files }: ListedSession| {
+        // of the time of files nothing is taken: a copy has another one
+        let begun = SessionFacts::read(&folder.join(&name)).ok().and_then(|facts| facts.begun);
+        let mut session = json!({ "is_current": name == current, "name": name, "bytes": bytes, "files": files });
+        if let Some(begun) = begun {
+            session["begun"] = begun.into();
+        }
+        session
+    };
     Ok(listed.into_iter().map(shown).collect())
 }
 

@@ -14,12 +14,13 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use super::access::Role;
+use super::answers::{as_json, refusal, role_of};
 use super::connection;
 use super::downloads::{body_of, sessions};
 use super::page::PAGE;
+use super::reports;
 use super::site::Site;
 
 /// Pages at a time at most.
@@ -58,19 +59,10 @@ pub(super) fn router(site: Arc<Site>) -> Router {
         .route("/api/state", get(state))
         .route("/api/sessions", get(list_sessions))
         .route("/api/sessions/{session}/{file}", get(download))
+        .route("/api/reports/{session}", get(reports::show).post(reports::make))
         .fallback(|| async { refusal(StatusCode::NOT_FOUND, "there is nothing at this address") })
         .layer(checked)
         .with_state(site)
-}
-
-/// `{"error": …}`.
-fn refusal(status: StatusCode, why: &str) -> Response {
-    (status, [(header::CONTENT_TYPE, "application/json")], json!({ "error": why }).to_string()).into_response()
-}
-
-fn as_json(value: &impl serde::Serialize) -> Response {
-    let text = serde_json::to_string(value).unwrap_or_default();
-    ([(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text).into_response()
 }
 
 /// Host and origin of every request; what goes out with every answer.
@@ -86,7 +78,8 @@ async fn check(State(site): State<Arc<Site>>, request: Request, next: Next) -> R
         (header::X_FRAME_OPTIONS, "DENY"),
     ];
     for (name, value) in constant {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
+        // a report has a stricter policy of its own
+        response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
     }
     response
 }
@@ -105,13 +98,6 @@ fn refused(site: &Site, method: &Method, headers: &HeaderMap) -> Option<&'static
         Some(origin) if !site.access.is_origin(origin) => Some("the request comes from another page"),
         _ => None,
     }
-}
-
-/// The role of who asks.
-fn role_of(site: &Site, headers: &HeaderMap) -> Result<Role, Box<Response>> {
-    let cookies = headers.get(header::COOKIE).and_then(|value| value.to_str().ok()).unwrap_or_default();
-    let why = "this page was not let in: open it by a new link, which touchup prints, or another page makes";
-    site.access.role(cookies).ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
 }
 
 fn asset(name: &str, cache: &'static str, headers: &HeaderMap) -> Response {

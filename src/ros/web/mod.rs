@@ -6,6 +6,8 @@
 
 mod access;
 mod annotations;
+mod answers;
+mod background;
 mod board;
 mod calls;
 mod connection;
@@ -17,6 +19,9 @@ mod listener;
 mod mesh_copy;
 mod nominal;
 mod page;
+mod report_request;
+mod report_work;
+mod reports;
 mod site;
 mod vertex_numbers;
 
@@ -38,10 +43,12 @@ use self::calls::Calls;
 pub use self::error::WebError;
 pub use self::listener::Certificate;
 use self::nominal::Nominal;
+use self::report_work::Reports;
 use self::site::{ScanShown, Site};
 use super::inbox::Inbox;
 use super::messages::MeshPatch;
 use super::port::{Port, Publication};
+use crate::io::mesh_file::MeshUnit;
 use crate::mesh::{FaceTree, TriMesh};
 
 /// Where the page is served, and how.
@@ -68,6 +75,10 @@ pub struct NodeFacts {
     pub session_folder: PathBuf,
     /// the part as it should be, m in O; `None`: nobody said
     pub nominal: Option<TriMesh>,
+    /// its file, in the unit of the scan
+    pub nominal_file: Option<PathBuf>,
+    /// unit of the coordinates in files of meshes
+    pub mesh_unit: MeshUnit,
 }
 
 /// Serves until it is dropped.
@@ -137,6 +148,7 @@ pub fn start(
         access,
         annotations: Annotations::new(&facts.session_folder),
         nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
+        reports: Reports::new(facts.nominal_file, facts.mesh_unit),
         scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
         scan_mesh: facts.scan_mesh,
         session_folder: facts.session_folder,

@@ -15,6 +15,7 @@ use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
 use super::calls::{Answer, Calls, MAY_ONLY_LOOK};
 use super::nominal::Nominal;
+use super::report_work::Reports;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Inbox;
 use crate::ros::stop::Motion;
@@ -27,6 +28,7 @@ pub(super) struct Site {
     pub access: Access,
     pub annotations: Annotations,
     pub nominal: Option<Arc<Nominal>>,
+    pub reports: Reports,
     pub scan: ScanShown,
     /// with the tree over its faces
     pub scan_mesh: Arc<(TriMesh, FaceTree)>,
@@ -62,6 +64,8 @@ pub(super) struct SiteState<'a> {
     session: String,
     is_paused: bool,
     scan: &'a ScanShown,
+    /// file of the nominal part
+    nominal_part: Option<String>,
     arm: Option<ArmShown>,
     clients: usize,
 }
@@ -77,6 +81,7 @@ impl Site {
             session: self.board.session(),
             is_paused: stops.is_paused(),
             scan: &self.scan,
+            nominal_part: self.reports.part_name(),
             arm,
             clients: self.pages.load(Ordering::Relaxed),
         }

@@ -11,6 +11,6 @@ mod strokes;
 
 pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
 pub use outliers::UncertaintySummary;
-pub use record::{SessionError, SessionRecord, SessionRecorder, Unrecorded};
+pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};
 pub use remade::{EvidenceSource, RemakeError};
 pub use strokes::{Exchange, StrokeChange, StrokeChanges, StrokeReplay};

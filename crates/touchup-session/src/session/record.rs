@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{Builder, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
+use chrono::{DateTime, SecondsFormat, Utc};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +64,31 @@ struct Description {
     mesh_unit: MeshUnit,
     wrench_topic: String,
     pose_topic: String,
+    /// RFC 3339, UTC; older sessions do not say it
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    begun: Option<String>,
+}
+
+/// What a session says of itself, without its scan being looked at.
+#[derive(Clone, Debug)]
+pub struct SessionFacts {
+    /// day and time, UTC, RFC 3339; older sessions do not say it
+    pub begun: Option<String>,
+    /// unit of the coordinates in its meshes
+    pub mesh_unit: MeshUnit,
+}
+
+impl SessionFacts {
+    /// Reads them from the folder of a session.
+    ///
+    /// # Errors
+    /// [`SessionError`]: not every folder is that of a session.
+    pub fn read(folder: &Path) -> Result<Self, SessionError> {
+        let path = folder.join(DESCRIPTION);
+        let text = read_text(&path).map_err(io_error(&path))?;
+        let Description { begun, mesh_unit, .. } = parsed(&text, &path)?;
+        Ok(Self { begun: begun.filter(|begun| DateTime::parse_from_rfc3339(begun).is_ok()), mesh_unit })
+    }
 }
 
 /// A session as it is on the disk.
@@ -83,7 +109,7 @@ pub struct SessionRecord {
 }
 
 impl SessionRecord {
-    /// Writes scene and reference of the scan into a new folder.
+    /// Writes scene, beginning and reference of the scan into a new folder.
     ///
     /// # Errors
     /// [`SessionError::Io`].
@@ -93,10 +119,12 @@ impl SessionRecord {
         mesh_unit: MeshUnit,
         scene_yaml: &str,
         topics: &Topics,
+        begun: SystemTime,
     ) -> Result<(), SessionError> {
+        let begun = Some(DateTime::<Utc>::from(begun).to_rfc3339_opts(SecondsFormat::Secs, true));
         let (scan, scan_crc32) = fingerprint(scan).map_err(io_error(scan))?;
         let (wrench_topic, pose_topic) = (topics.wrench.clone(), topics.pose.clone());
-        let description = Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic };
+        let description = Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic, begun };
         let text = serde_json::to_string_pretty(&description).expect("paths that were read are text, or are refused");
         folder.write_text(SCENE, scene_yaml).map_err(io_error(folder.path()))?;
         folder.write_text(DESCRIPTION, &text).map_err(io_error(folder.path()))
@@ -109,7 +137,7 @@ impl SessionRecord {
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(DESCRIPTION);
         let text = read_text(&path).map_err(io_error(&path))?;
-        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic } = parsed(&text, &path)?;
+        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic, .. } = parsed(&text, &path)?;
         let now = fingerprint(&scan).map_err(io_error(&scan))?;
         if now.1 != scan_crc32 {
             return Err(SessionError::ScanChanged { path: scan });
@@ -352,6 +380,27 @@ mod tests {
     fn on_disk(folder: &SessionFolder) -> Vec<Message> {
         let reader = RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
         reader.map_while(Result::ok).collect()
+    }
+
+    /// 1 795 212 850 s is 2026-11-20T22:14:10Z, as `date -u` has it.
+    #[test]
+    fn a_session_says_when_it_began_and_an_older_one_does_not() {
+        let (parent, folder) = folder();
+        let scan = parent.path().join("scan.stl");
+        touchup_io::session_folder::write_text_file(&scan, "solid").unwrap();
+        let begun = SystemTime::UNIX_EPOCH + Duration::from_secs(1_795_212_850);
+        SessionRecord::begin(&folder, &scan, MeshUnit::Inch, "", &Topics::default(), begun).unwrap();
+        let facts = SessionFacts::read(folder.path()).unwrap();
+        assert_eq!((facts.begun.as_deref(), facts.mesh_unit), (Some("2026-11-20T22:14:10Z"), MeshUnit::Inch));
+        let text = read_text(&folder.path().join(DESCRIPTION)).unwrap();
+        let mut older: serde_json::Value = serde_json::from_str(&text).unwrap();
+        older.as_object_mut().unwrap().remove("begun").unwrap();
+        folder.write_text(DESCRIPTION, &older.to_string()).unwrap();
+        assert_eq!(SessionFacts::read(folder.path()).unwrap().begun, None);
+        older["begun"] = "yesterday".into();
+        folder.write_text(DESCRIPTION, &older.to_string()).unwrap();
+        assert_eq!(SessionFacts::read(folder.path()).unwrap().begun, None);
+        assert!(SessionFacts::read(parent.path()).is_err());
     }
 
     /// What came in between two of its looks is on the disk after the second, and not before.

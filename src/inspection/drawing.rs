@@ -2,29 +2,31 @@
 
 use std::path::Path;
 
+use super::InspectionError;
 use super::source::inspected_file;
-use crate::cli::{CliError, Losses, counted, print_result};
 use crate::conformity::{GeneralTolerance, InspectedQuantity, ToleranceLimits};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::InspectedFile;
 use crate::io::mesh_file::MeshUnit;
-use crate::io::nominal_file::{
-    NominalFileError, NominalRecord, NominalTolerance, is_nominal_file, read_nominal, write_nominal,
-};
+use crate::io::nominal_file::{NominalRecord, NominalTolerance, is_nominal_file, read_nominal};
 use crate::scan::read_scan;
 use crate::session::found;
 
-/// What flags say of a drawing.
-pub(super) struct DrawingFlags {
+/// What is added to nominal values.
+#[derive(Clone, Debug, Default)]
+pub struct DrawingParams {
     /// of a CAD mesh
     pub unit: MeshUnit,
+    /// tolerance of sizes that have none of their own
     pub general: Option<GeneralTolerance>,
+    /// … or ± this, mm
     pub tolerance_mm: Option<f64>,
+    /// diameter of the zone for the position of what a CAD mesh has, mm
     pub position_mm: Option<f64>,
 }
 
 /// One characteristic and its limits.
-pub(super) struct Drawn {
+pub struct Drawn {
     pub nominal: NominalRecord,
     pub quantity: InspectedQuantity,
     pub limits: ToleranceLimits,
@@ -33,7 +35,7 @@ pub(super) struct Drawn {
 }
 
 /// All characteristics of a part.
-pub(super) struct PartDrawing {
+pub struct PartDrawing {
     pub characteristics: Vec<Drawn>,
     pub file: InspectedFile,
     /// what was left out of it, in words
@@ -42,28 +44,28 @@ pub(super) struct PartDrawing {
 
 impl PartDrawing {
     /// Reads nominal values, or makes them of the features of a CAD mesh.
-    pub fn read(path: &Path, flags: &DrawingFlags) -> Result<Self, CliError> {
+    pub fn read(path: &Path, params: &DrawingParams) -> Result<Self, InspectionError> {
         if is_nominal_file(path) {
             let records = read_nominal(path)?;
             let drawn = |record: NominalRecord| {
-                drawn(record, flags)
-                    .map_err(|why| CliError::new(("nominal", 3), format!("{}: {why}", path.display()), None))
+                drawn(record, params).map_err(|why| InspectionError::Drawing { path: path.to_owned(), why })
             };
             let characteristics = records.into_iter().map(drawn).collect::<Result<_, _>>()?;
             return Ok(Self { characteristics, file: inspected_file("drawing", path)?, notes: Vec::new() });
         }
-        let has_tolerance = flags.general.is_some() || flags.tolerance_mm.is_some();
-        let why = "a CAD mesh has no tolerances: name a general one by --general iso2768-m or --tolerance-mm";
-        crate::cli::require(has_tolerance, why)?;
-        let records = of_features(&features_of_mesh(path, flags)?.features, flags);
+        let has_tolerance = params.general.is_some() || params.tolerance_mm.is_some();
+        if !has_tolerance {
+            return Err(InspectionError::NoTolerance);
+        }
+        let records = of_features(&features_of_mesh(path, params)?.features, params);
         let (mut characteristics, mut left) = (Vec::new(), Vec::new());
         for record in records {
             let name = record.name.clone();
-            drawn(record, flags).map_or_else(|_| left.push(name), |one| characteristics.push(one));
+            drawn(record, params).map_or_else(|_| left.push(name), |one| characteristics.push(one));
         }
         if characteristics.is_empty() {
-            let why = format!("{}: no hole, slot, pocket, boss, notch or cylinder was found on it", path.display());
-            return Err(CliError::new(("nominal", 3), why, None));
+            let why = "no hole, slot, pocket, boss, notch or cylinder was found on it".to_owned();
+            return Err(InspectionError::Drawing { path: path.to_owned(), why });
         }
         let mut notes = Vec::new();
         if !left.is_empty() {
@@ -74,11 +76,11 @@ impl PartDrawing {
 }
 
 /// A characteristic with its own limits, or those of the general tolerance.
-fn drawn(nominal: NominalRecord, flags: &DrawingFlags) -> Result<Drawn, String> {
+fn drawn(nominal: NominalRecord, params: &DrawingParams) -> Result<Drawn, String> {
     let quantity = nominal.quantity().ok_or_else(|| format!("{}: no such quantity", nominal.name))?;
     let (limits, from) = match nominal.tolerance() {
         NominalTolerance::Limits(limits) => (limits, "drawing".to_owned()),
-        NominalTolerance::General => general_limits(&nominal, quantity, flags)?,
+        NominalTolerance::General => general_limits(&nominal, quantity, params)?,
     };
     Ok(Drawn { nominal, quantity, limits, from })
 }
@@ -86,11 +88,11 @@ fn drawn(nominal: NominalRecord, flags: &DrawingFlags) -> Result<Drawn, String> 
 fn general_limits(
     record: &NominalRecord,
     quantity: InspectedQuantity,
-    flags: &DrawingFlags,
+    params: &DrawingParams,
 ) -> Result<(ToleranceLimits, String), String> {
     let (name, unit, nominal) = (&record.name, quantity.unit(), record.nominal());
     let own = format!("fill in tolerance_{unit} or limit deviations");
-    if flags.general.is_none() && flags.tolerance_mm.is_none() {
+    if params.general.is_none() && params.tolerance_mm.is_none() {
         return Err(format!(
             "{name} has no tolerance: {own}, or name a general one by --general iso2768-m or --tolerance-mm"
         ));
@@ -98,7 +100,7 @@ fn general_limits(
     if !quantity.is_linear_size() {
         return Err(format!("{name} has no tolerance, and the general one is for sizes, not for {quantity}: {own}"));
     }
-    let (half, from) = match (flags.tolerance_mm, flags.general) {
+    let (half, from) = match (params.tolerance_mm, params.general) {
         (Some(tolerance), _) => (Some(tolerance), "--tolerance-mm".to_owned()),
         (None, Some(class)) => (class.linear_mm(nominal), class.name().to_owned()),
         (None, None) => (None, String::new()),
@@ -107,11 +109,8 @@ fn general_limits(
     Ok((ToleranceLimits { lower: Some(nominal - half), upper: Some(nominal + half) }, from))
 }
 
-fn features_of_mesh(path: &Path, flags: &DrawingFlags) -> Result<FeatureFile, CliError> {
-    let named = |error: crate::scan::ScanError| {
-        CliError::new(("nominal", 3), error.to_string().replace("--mesh-unit", "--nominal-unit"), Some(&error))
-    };
-    let scan = read_scan(path, flags.unit).map_err(named)?;
+fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, InspectionError> {
+    let scan = read_scan(path, params.unit).map_err(InspectionError::DrawingMesh)?;
     Ok(found(&scan.mesh, &[]).1)
 }
 
@@ -119,7 +118,7 @@ fn features_of_mesh(path: &Path, flags: &DrawingFlags) -> Result<FeatureFile, Cl
 const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylinder"];
 
 /// Sizes of features as nominal values without tolerances; those of a through hole without its depth.
-fn of_features(features: &[FeatureRecord], flags: &DrawingFlags) -> Vec<NominalRecord> {
+fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<NominalRecord> {
     let mut records = Vec::new();
     let mut counts = std::collections::BTreeMap::new();
     for feature in features.iter().filter(|feature| WITH_SIZES.contains(&&*feature.kind)) {
@@ -144,7 +143,7 @@ fn of_features(features: &[FeatureRecord], flags: &DrawingFlags) -> Vec<NominalR
             let nominal_mm = Some(rounded(size));
             records.push(NominalRecord { name, quantity: quantity.name().to_owned(), nominal_mm, ..base.clone() });
         }
-        if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") = (flags.position_mm, &**kind) {
+        if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") = (params.position_mm, &**kind) {
             let (name, quantity) = (format!("{kind} {count} position"), InspectedQuantity::Position.name().to_owned());
             records.push(NominalRecord { name, quantity, tolerance_mm: Some(tolerance), ..base });
         }
@@ -157,46 +156,29 @@ fn rounded(mm: f64) -> f64 {
     (mm * 1e3).round() / 1e3
 }
 
-/// Writes nominal values to be edited.
-pub(super) fn write_template(
-    path: &Path,
-    nominal: Option<&Path>,
+/// Nominal values to be edited: those of a CAD mesh, or else of what was measured, with the general tolerance where there is one.
+///
+/// - `mesh`: the CAD mesh.
+///
+/// # Errors
+/// [`InspectionError`] of the mesh.
+pub fn template(
+    mesh: Option<&Path>,
     measured: &FeatureFile,
-    flags: &DrawingFlags,
-) -> Result<Losses, CliError> {
-    let of_mesh = nominal.filter(|nominal| !is_nominal_file(nominal));
-    crate::cli::require(
-        nominal.is_none() || of_mesh.is_some(),
-        "--write-nominal begins with a CAD mesh or with FEATURES",
-    )?;
-    let records = match of_mesh {
-        Some(mesh) => of_features(&features_of_mesh(mesh, flags)?.features, flags),
-        None => of_features(&measured.features, flags),
+    params: &DrawingParams,
+) -> Result<Vec<NominalRecord>, InspectionError> {
+    let records = match mesh {
+        Some(mesh) => of_features(&features_of_mesh(mesh, params)?.features, params),
+        None => of_features(&measured.features, params),
     };
-    if records.is_empty() {
-        return Err(CliError::from(NominalFileError::Empty(path.to_owned())));
-    }
     let with_tolerance = |record: NominalRecord| {
         let is_drawn = matches!(record.tolerance(), NominalTolerance::Limits(_));
-        let half = match (flags.tolerance_mm, flags.general) {
+        let half = match (params.tolerance_mm, params.general) {
             _ if is_drawn => record.tolerance_mm,
             (Some(tolerance), _) => Some(tolerance),
             (None, class) => class.and_then(|class| class.linear_mm(record.nominal())),
         };
         NominalRecord { tolerance_mm: half, ..record }
     };
-    let records: Vec<_> = records.into_iter().map(with_tolerance).collect();
-    let origin = if of_mesh.is_some() {
-        "features of the CAD mesh"
-    } else {
-        "MEASURED features: replace them by those of the drawing"
-    };
-    let comment = [
-        &*format!("nominal values are those of the {origin}"),
-        "lengths in mm, angles in degrees, in the frame of the mesh; docs/inspect.md has all columns",
-    ];
-    write_nominal(path, &records, &comment)?;
-    let count = counted(records.len(), "characteristic", "characteristics");
-    print_result(&format!("wrote {}: {count}; fill in the tolerances", path.display()))?;
-    Ok(Losses::new())
+    Ok(records.into_iter().map(with_tolerance).collect())
 }

@@ -1,11 +1,12 @@
 //! The files that an inspection rests on.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
-use crate::cli::{CliError, require};
+use super::InspectionError;
 use crate::io::features_file::{FeatureFile, FeatureRecord, read_features};
 use crate::io::inspection_file::InspectedFile;
 use crate::io::probed_touches_file::{TouchLine, read_probed_touches};
@@ -14,7 +15,7 @@ use crate::io::touches_file::read_touches;
 use crate::stylus::ProbedPoint;
 
 /// What was measured, as its files have it.
-pub(super) struct InspectionSource {
+pub struct InspectionSource {
     pub features: FeatureFile,
     pub touches: Vec<ProbedPoint>,
     /// of an arm
@@ -31,26 +32,23 @@ pub(super) struct InspectionSource {
 impl InspectionSource {
     /// - `path`: a file of features, or a folder with one.
     /// - `named`: touches, mesh and scene, where flags name them; else they are looked for beside the features.
-    pub fn read(path: &Path, named: [Option<&Path>; 3]) -> Result<Self, CliError> {
+    pub fn read(path: &Path, named: [Option<&Path>; 3]) -> Result<Self, InspectionError> {
         if let Some(probed) = probed_file(path) {
             return Self::of_probing(&probed, named);
         }
-        let features_path = if path.is_dir() { path.join("features.json") } else { path.to_owned() };
-        let hint = "refine --features-out, features --out and probe write one; a session has it once it was saved";
-        let is_there = !path.is_dir() || features_path.is_file();
-        require(is_there, format_args!("{} has no features.json: {hint}", path.display()))?;
+        let (features_path, touches_name) = features_of(path)?;
         let features = read_features(&features_path)?;
         let folder = features_path.parent().unwrap_or(Path::new("")).to_owned();
         let beside = |named: Option<&Path>, name: &str| {
             named.map(Path::to_owned).or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
         };
         let [touches_path, mesh, scene] = named;
-        let (touches_path, mesh) = (beside(touches_path, "touches.csv"), beside(mesh, "refined.ply"));
+        let (touches_path, mesh) = (beside(touches_path, touches_name), beside(mesh, "refined.ply"));
         let scene = beside(scene, "scene.yaml");
         let touches = touches_path.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
         check_touches(&features, &touches, touches_path.as_deref())?;
         let probed_path = folder.join("probed_touches.jsonl");
-        let probed = read_probed_touches(&probed_path).map_err(|error| CliError::inspected(&probed_path, error))?;
+        let probed = read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let mut files = vec![inspected_file("features", &features_path)?];
         let probed_path = (!probed.is_empty()).then_some(probed_path);
         let others =
@@ -62,16 +60,16 @@ impl InspectionSource {
     }
 
     /// What an arm measured: the feature of each flag, by the number of the flag, and the touches that it was measured by.
-    fn of_probing(path: &Path, [_, mesh, scene]: [Option<&Path>; 3]) -> Result<Self, CliError> {
+    fn of_probing(path: &Path, [_, mesh, scene]: [Option<&Path>; 3]) -> Result<Self, InspectionError> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let beside = |named: Option<&Path>, name: &str| {
             named.map(Path::to_owned).or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
         };
-        let text = read_text(path).map_err(|error| CliError::inspected(path, error))?;
-        let ProbedFeatures { features } = serde_json::from_str(&text)
-            .map_err(|error| CliError::new(("features", 3), format!("{}: {error}", path.display()), None))?;
+        let text = read_text(path).map_err(|error| not_read(path, error))?;
+        let ProbedFeatures { features } =
+            serde_json::from_str(&text).map_err(|source| InspectionError::Probed { path: path.to_owned(), source })?;
         let probed_path = folder.join("probed_touches.jsonl");
-        let probed = read_probed_touches(&probed_path).map_err(|error| CliError::inspected(&probed_path, error))?;
+        let probed = read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let (mut found, mut touches) = (FeatureFile::default(), Vec::new());
         for ProbedFeature { flag, feature } in features {
             let Some(feature) = feature else { continue };
@@ -92,6 +90,26 @@ impl InspectionSource {
             "Measured by an arm: ids are the numbers of the flags; form and relations were not measured.".to_owned();
         Ok(Self { features: found, touches, probed, mesh, scene, files, notes: vec![note] })
     }
+}
+
+fn not_read(path: &Path, source: io::Error) -> InspectionError {
+    InspectionError::File { path: path.to_owned(), source }
+}
+
+/// The features of a folder, and how the file of their touches is called: those of a session that was ended or refined, else those that
+/// `~/save_mesh` has saved of one that runs.
+const IN_FOLDER: [(&str, &str); 2] =
+    [("features.json", "touches.csv"), ("refined.features.json", "refined.touches.csv")];
+
+/// The file of features that `path` is, or that is in the folder `path`, and the name of the touches beside it.
+fn features_of(path: &Path) -> Result<(PathBuf, &'static str), InspectionError> {
+    if !path.is_dir() {
+        let is_saved = path.file_name().is_some_and(|name| name == IN_FOLDER[1].0);
+        return Ok((path.to_owned(), IN_FOLDER[usize::from(is_saved)].1));
+    }
+    let there = IN_FOLDER.map(|(features, touches)| (path.join(features), touches));
+    let found = there.into_iter().find(|(features, _)| features.is_file());
+    found.ok_or_else(|| InspectionError::NoFeatures(path.to_owned()))
 }
 
 /// `probed.json` as far as an inspection needs it.
@@ -142,8 +160,8 @@ fn renumbered(mut feature: FeatureRecord, id: u32, offset: u32) -> FeatureRecord
 }
 
 /// A file with its length and checksum.
-pub(super) fn inspected_file(role: &str, path: &Path) -> Result<InspectedFile, CliError> {
-    let not_read = |error| CliError::inspected(path, error);
+pub(super) fn inspected_file(role: &str, path: &Path) -> Result<InspectedFile, InspectionError> {
+    let not_read = |error| not_read(path, error);
     let (_, crc32) = fingerprint(path).map_err(not_read)?;
     let bytes = Path::metadata(path).map_err(not_read)?.len();
     let (role, path) = (role.to_owned(), path.display().to_string());
@@ -151,11 +169,39 @@ pub(super) fn inspected_file(role: &str, path: &Path) -> Result<InspectedFile, C
 }
 
 /// Features name touches by number: a file of other touches is found where it is too short.
-fn check_touches(features: &FeatureFile, touches: &[ProbedPoint], path: Option<&Path>) -> Result<(), CliError> {
+fn check_touches(features: &FeatureFile, touches: &[ProbedPoint], path: Option<&Path>) -> Result<(), InspectionError> {
     let Some(path) = path else { return Ok(()) };
     let runs = features.features.iter().flat_map(|feature| feature.touches.values().flatten());
     let Some(last) = runs.map(|[_, last]| *last as usize).max() else { return Ok(()) };
-    let (path, count) = (path.display(), touches.len());
-    let why = format!("{path} has {count} touches and the features name touch {last}: it is of another measurement");
-    if last < count { Ok(()) } else { Err(CliError::new(("touches", 3), why, None)) }
+    let (count, other) = (touches.len(), path.to_owned());
+    if last < count { Ok(()) } else { Err(InspectionError::OtherTouches { path: other, count, named: last }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A feature of the mesh, and no touches.
+    fn write(folder: &Path, features: &str, touches: &str) {
+        let text = r#"{"features": [{"id": 1, "kind": "hole", "diameter_mm": 8.0, "fitted_to": "mesh"}]}"#;
+        crate::io::session_folder::write_text_file(&folder.join(features), text).unwrap();
+        crate::io::touches_file::write_touches(&folder.join(touches), &[]).unwrap();
+    }
+
+    #[test]
+    fn what_was_saved_of_a_session_counts_until_it_is_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let read = || InspectionSource::read(folder.path(), [None; 3]);
+        let why = read().map(drop).unwrap_err().to_string();
+        assert!(why.contains("has no features.json") && why.contains("once it was saved"), "{why}");
+        let names = |source: InspectionSource| -> Vec<String> {
+            source.files.iter().map(|file| file.path.rsplit('/').next().unwrap_or_default().to_owned()).collect()
+        };
+        write(folder.path(), "refined.features.json", "refined.touches.csv");
+        assert_eq!(names(read().unwrap()), ["refined.features.json", "refined.touches.csv"]);
+        write(folder.path(), "features.json", "touches.csv");
+        assert_eq!(names(read().unwrap()), ["features.json", "touches.csv"]);
+        let saved = InspectionSource::read(&folder.path().join("refined.features.json"), [None; 3]);
+        assert_eq!(names(saved.unwrap()), ["refined.features.json", "refined.touches.csv"]);
+    }
 }

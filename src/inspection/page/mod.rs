@@ -11,16 +11,12 @@ mod style;
 mod tolerance_bar;
 mod touches;
 
-use std::io::{self, Write};
-use std::path::Path;
-
 use self::html::{css_string, escaped};
 pub(super) use self::input::ReportInput;
-use crate::cli::CliError;
-use crate::io::atomic::write_atomically;
+use crate::inspection::InspectionError;
 
 /// The whole page.
-pub(super) fn page(input: &ReportInput<'_>) -> Result<String, CliError> {
+pub(super) fn page(input: &ReportInput<'_>) -> Result<String, InspectionError> {
     let record = &input.inspected.record;
     let title = format!("Inspection report{}", record.part.as_ref().map_or(String::new(), |part| format!(": {part}")));
     let foot = [record.part.as_deref(), record.serial.as_deref(), Some(&*record.date)];
@@ -43,9 +39,4 @@ pub(super) fn page(input: &ReportInput<'_>) -> Result<String, CliError> {
         style::CSS,
         css_string(&foot),
     ))
-}
-
-/// Writes it, as a whole or not at all.
-pub(super) fn write_page(path: &Path, page: &str) -> io::Result<()> {
-    write_atomically(path, |out| out.write_all(page.as_bytes()))
 }

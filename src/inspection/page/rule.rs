@@ -1,8 +1,8 @@
 //! The decision rule in words and formulas, and the symbols.
 
 use super::sections::rule_name;
-use crate::cli::inspect::summary::percent;
 use crate::conformity::{DecisionRule, InspectedQuantity};
+use crate::inspection::words::percent;
 use crate::io::inspection_file::InspectionRecord;
 use touchup_core::numeric::normal_quantile;
 

@@ -8,9 +8,10 @@ use nalgebra::Point3;
 use super::decisions::{DecisionLook, look_of};
 use super::html::base64;
 use super::input::ReportInput;
-use crate::cli::{CliError, not_written};
 use crate::compare::{PartView, PicturePanel, PictureParams, Rgb, draw_part};
 use crate::conformity::Decision;
+use crate::inspection::InspectionError;
+use crate::io::file_error::FileError;
 use crate::io::mesh_file::read_vertex_columns;
 use crate::io::png::png_bytes;
 use crate::scan::{Scan, read_scan};
@@ -25,14 +26,14 @@ const TOUCHED: Rgb = [150, 184, 214];
 const SCANNED: Rgb = [205, 208, 213];
 
 /// The section; says so where there is no mesh.
-pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, CliError> {
+pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError> {
     let Some(path) = &input.source.mesh else {
         return Ok(
             "<h2>Picture</h2>\n<p class=\"small\">No mesh was given (--mesh): there is no picture.</p>\n".to_owned()
         );
     };
-    let Scan { mesh, .. } = read_scan(path, input.mesh_unit)?;
-    let [touched] = read_vertex_columns(path, input.mesh_unit, &mesh, ["touched"])?;
+    let Scan { mesh, .. } = read_scan(path, input.picture.mesh_unit)?;
+    let [touched] = read_vertex_columns(path, input.picture.mesh_unit, &mesh, ["touched"])?;
     let is_touched =
         |vertex: usize| touched.as_ref().and_then(|column| column.get(vertex)).is_some_and(|share| *share >= 1.0);
     let slots = mesh.vertex_slots();
@@ -45,10 +46,15 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, CliError> {
     let places: Vec<_> =
         placed.iter().filter_map(|balloon| balloon.place_mm).map(|mm| Point3::from(mm) * 1e-3).collect();
     let panel = PicturePanel { paint: Some(&paint), ..PicturePanel::of(&mesh) };
-    let params =
-        PictureParams { width: WIDTH, from: input.view, weights: weights.as_deref(), ..PictureParams::default() };
+    let params = PictureParams {
+        width: WIDTH,
+        from: input.picture.view,
+        weights: weights.as_deref(),
+        ..PictureParams::default()
+    };
     let PartView { picture, places } = draw_part(&panel, &params, &places);
-    let png = png_bytes(picture.size, &picture.pixels).map_err(not_written(path))?;
+    let png =
+        png_bytes(picture.size, &picture.pixels).map_err(|source| FileError::Write { path: path.clone(), source })?;
     let [width, height] = picture.size.map(f64::from);
     let mut svg = format!(
         "<svg class=\"part\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"the part with numbered features\"><rect width=\"100%\" height=\"100%\" fill=\"#e9ecf0\"/><image x=\"{MARGIN}\" y=\"{MARGIN}\" width=\"{width}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>",

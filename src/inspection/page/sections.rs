@@ -3,10 +3,10 @@
 use super::decisions::{in_words, shown};
 use super::html::{escaped, table};
 use super::input::ReportInput;
-use crate::cli::inspect::calibration::CalibrationLine;
-use crate::cli::inspect::measured::relation_number;
-use crate::cli::inspect::summary::first_few;
 use crate::conformity::{Decision, InspectedQuantity, MeasuredNumber};
+use crate::inspection::calibration::CalibrationLine;
+use crate::inspection::measured::relation_number;
+use crate::inspection::words::first_few;
 use crate::io::inspection_file::InspectionRecord;
 
 const NOT_STATED: &str = "not stated";
@@ -27,7 +27,7 @@ pub(super) fn head(record: &InspectionRecord) -> String {
 
 /// The rule in a few words.
 pub(super) fn rule_name(record: &InspectionRecord) -> String {
-    let percent = crate::cli::inspect::summary::percent(record.confidence);
+    let percent = crate::inspection::words::percent(record.confidence);
     match &*record.rule {
         "simple" => "simple acceptance, no guard bands".to_owned(),
         _ => format!("ISO 14253-1, guard bands, {percent}\u{a0}%"),

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use chrono::{DateTime, Utc};
+use touchup_core::numeric::counted;
 
+use super::InspectionError;
 use super::source::InspectionSource;
-use crate::cli::CliError;
 use crate::scene::Scene;
 use crate::stylus::ProbedPoint;
 
@@ -20,9 +21,12 @@ pub(super) struct CalibrationLine {
 const NOT_STATED: &str = "not stated";
 
 /// The state of the calibration, as far as scene and touches say it.
-pub(super) fn calibration_of(source: &InspectionSource) -> Result<Vec<CalibrationLine>, CliError> {
-    let scene =
-        source.scene.as_deref().map(|path| Ok::<_, CliError>((path, Scene::read_with_text(path)?))).transpose()?;
+pub(super) fn calibration_of(source: &InspectionSource) -> Result<Vec<CalibrationLine>, InspectionError> {
+    let scene = source
+        .scene
+        .as_deref()
+        .map(|path| Ok::<_, InspectionError>((path, Scene::read_with_text(path)?)))
+        .transpose()?;
     let mut lines = of_touches(&source.touches);
     match &scene {
         Some((path, (scene, yaml))) => lines.extend(of_scene(path, scene, yaml)),
@@ -101,9 +105,5 @@ fn changed(path: &Path) -> String {
 /// A date and how long ago it was.
 fn age(at: DateTime<Utc>) -> String {
     let days = DateTime::<Utc>::from(SystemTime::now()).signed_duration_since(at).num_days();
-    format!(
-        "{}, {} before this inspection",
-        at.format("%Y-%m-%d"),
-        crate::cli::counted(days.max(0) as usize, "day", "days")
-    )
+    format!("{}, {} before this inspection", at.format("%Y-%m-%d"), counted(days.max(0) as usize, "day", "days"))
 }

@@ -6,14 +6,12 @@ use std::time::SystemTime;
 use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::{Point3, Vector3};
 
-use super::arguments::InspectArguments;
+use super::InspectionParams;
 use super::drawing::{Drawn, PartDrawing};
 use super::measured::{CharacteristicMeasurement, measurement};
 use super::source::InspectionSource;
-use crate::cli::CliError;
 use crate::conformity::{
-    Assessment, Decision, DecisionParams, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess,
-    match_features,
+    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess, match_features,
 };
 use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
@@ -22,7 +20,7 @@ use crate::io::machine::VERSION;
 use crate::io::nominal_file::NominalRecord;
 
 /// One feature of the drawing, a balloon of the picture.
-pub(super) struct Balloon {
+pub struct Balloon {
     /// from 1 on
     pub number: usize,
     /// what it is
@@ -36,7 +34,7 @@ pub(super) struct Balloon {
 }
 
 /// A whole inspection, as it is shown.
-pub(super) struct Inspected {
+pub struct Inspected {
     pub record: InspectionRecord,
     pub balloons: Vec<Balloon>,
     /// of each characteristic, the touches behind it: runs of numbers
@@ -46,15 +44,10 @@ pub(super) struct Inspected {
 }
 
 /// Inspects.
-pub(super) fn inspected(
-    arguments: &InspectArguments,
-    source: &InspectionSource,
-    drawing: &PartDrawing,
-    params: &DecisionParams,
-) -> Result<Inspected, CliError> {
+pub fn inspected(source: &InspectionSource, drawing: &PartDrawing, params: &InspectionParams) -> Inspected {
     let drawn = &drawing.characteristics;
     let groups = groups_of(drawn);
-    let found = match_all(drawn, &groups, &source.features, arguments.match_mm * 1e-3);
+    let found = match_all(drawn, &groups, &source.features, params.match_mm * 1e-3);
     let mut balloons = Vec::new();
     let (mut characteristics, mut runs) =
         (vec![CharacteristicRecord::default(); drawn.len()], vec![Vec::new(); drawn.len()]);
@@ -65,7 +58,7 @@ pub(super) fn inspected(
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
             let (record, behind) =
-                characteristic(&drawn[at], place, matched, &found.datums[at], &source.features, (params, arguments));
+                characteristic(&drawn[at], place, matched, &found.datums[at], &source.features, params);
             (characteristics[at], runs[at]) = (record, behind);
         }
         balloons.push(Balloon {
@@ -78,8 +71,8 @@ pub(super) fn inspected(
     }
     let matched: BTreeSet<u32> = balloons.iter().filter_map(|balloon| balloon.feature).collect();
     let quantities = drawn.iter().map(|drawn| drawn.quantity).collect();
-    let record = record_of(arguments, source, drawing, params, characteristics, &matched);
-    Ok(Inspected { record, balloons, runs, quantities })
+    let record = record_of(source, drawing, params, characteristics, &matched);
+    Inspected { record, balloons, runs, quantities }
 }
 
 /// Characteristics of the same feature of the drawing, in order of the first of each.
@@ -174,7 +167,7 @@ fn characteristic(
     matched: &FeatureMatch,
     datum: &Option<FeatureMatch>,
     file: &FeatureFile,
-    (params, arguments): (&DecisionParams, &InspectArguments),
+    params: &InspectionParams,
 ) -> (CharacteristicRecord, Vec<[u32; 2]>) {
     let Drawn { nominal, quantity, limits, from } = drawn;
     let feature = found_feature(matched, file);
@@ -193,7 +186,7 @@ fn characteristic(
         }
     };
     let assessment = match &measured.number {
-        Some(number) => assess(number, *limits, quantity.distribution(), params),
+        Some(number) => assess(number, *limits, quantity.distribution(), &params.decision),
         None => Assessment::default(),
     };
     let is_of_mesh = feature.is_some_and(|feature| feature.fitted_to == "mesh");
@@ -229,7 +222,7 @@ fn characteristic(
         ("actual", actual),
         ("deviation", actual.map(|actual| actual - nominal.nominal())),
         ("standard_uncertainty", std),
-        ("expanded_uncertainty", std.map(|std| std * arguments.k)),
+        ("expanded_uncertainty", std.map(|std| std * params.coverage_factor)),
         ("acceptance_lower", assessment.acceptance.lower),
         ("acceptance_upper", assessment.acceptance.upper),
         ("rejection_lower", assessment.rejection.lower),
@@ -247,10 +240,9 @@ fn missing(why: String) -> CharacteristicMeasurement {
 const COUNTED: [&str; 6] = ["hole", "slot", "pocket", "boss", "cylinder", "notch"];
 
 fn record_of(
-    arguments: &InspectArguments,
     source: &InspectionSource,
     drawing: &PartDrawing,
-    params: &DecisionParams,
+    params: &InspectionParams,
     characteristics: Vec<CharacteristicRecord>,
     matched: &BTreeSet<u32>,
 ) -> InspectionRecord {
@@ -266,14 +258,14 @@ fn record_of(
     let without: Vec<_> = counted.map(|feature| feature.id).filter(|id| !matched.contains(id)).collect();
     let files = [drawing.file.clone()].into_iter().chain(source.files.iter().cloned());
     InspectionRecord {
-        part: arguments.part.clone(),
-        serial: arguments.serial.clone(),
-        operator: arguments.operator.clone(),
+        part: params.part.clone(),
+        serial: params.serial.clone(),
+        operator: params.operator.clone(),
         date: DateTime::<Utc>::from(SystemTime::now()).to_rfc3339_opts(SecondsFormat::Secs, true),
         program: format!("touchup {VERSION}"),
-        rule: params.rule.name().to_owned(),
-        confidence: params.confidence,
-        coverage_factor: arguments.k,
+        rule: params.decision.rule.name().to_owned(),
+        confidence: params.decision.confidence,
+        coverage_factor: params.coverage_factor,
         verdict: verdict.name().to_owned(),
         counts,
         files: files.collect(),

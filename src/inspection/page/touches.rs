@@ -4,10 +4,10 @@ use super::decisions::in_words;
 use super::html::{escaped, table};
 use super::input::ReportInput;
 use super::plots::{force_plot, residual_plot};
-use crate::cli::counted;
-use crate::cli::inspect::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
-use crate::cli::inspect::rows::Balloon;
+use crate::inspection::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
+use crate::inspection::rows::Balloon;
 use crate::io::features_file::FeatureRecord;
+use touchup_core::numeric::counted;
 
 /// The section; nothing without touches.
 pub(super) fn touches(input: &ReportInput<'_>) -> String {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::cli::inspect::evidence::TouchEvidence;
+use crate::inspection::evidence::TouchEvidence;
 use crate::io::probed_touches_file::TouchLine;
 
 /// Pixels of a drawing, and what its axes take.

@@ -2,8 +2,8 @@
 
 use super::html::{escaped, table as html_table};
 use super::tolerance_bar::tolerance_bar;
-use crate::cli::inspect::rows::Inspected;
 use crate::conformity::InspectedQuantity;
+use crate::inspection::rows::Inspected;
 use crate::io::inspection_file::CharacteristicRecord;
 
 /// How a decision looks.

@@ -1,0 +1,24 @@
+//! Measured features against a drawing: each characteristic with its decision, and the report of all of them as HTML, CSV, JSON and QIF.
+//!
+//! What was measured ([`InspectionSource`]) and what the part should be ([`PartDrawing`]) give the characteristics ([`inspected`]); the
+//! decisions themselves are those of [`crate::conformity`]. Command line and operator's page make the same report of the same files.
+
+mod calibration;
+mod drawing;
+mod error;
+mod evidence;
+mod files;
+mod measured;
+mod page;
+mod params;
+mod rows;
+mod source;
+mod words;
+
+pub use self::drawing::{DrawingParams, PartDrawing, template};
+pub use self::error::InspectionError;
+pub use self::files::ReportFiles;
+pub use self::params::{InspectionParams, PartPicture};
+pub use self::rows::{Inspected, inspected};
+pub use self::source::InspectionSource;
+pub use self::words::{first_few, percent};

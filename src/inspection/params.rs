@@ -1,0 +1,78 @@
+//! How a part is inspected, and what the report says of who asked.
+
+use nalgebra::Vector3;
+
+use super::InspectionError;
+use super::drawing::DrawingParams;
+use crate::conformity::DecisionParams;
+use crate::io::mesh_file::MeshUnit;
+
+/// Settings of an inspection.
+#[derive(Clone, Debug)]
+pub struct InspectionParams {
+    /// what is added to the nominal values
+    pub drawing: DrawingParams,
+    /// how it is decided
+    pub decision: DecisionParams,
+    /// k of the expanded uncertainties U = k u. Default 2: about 95 %, as certificates have it.
+    pub coverage_factor: f64,
+    /// A feature is the nominal one where its centre is no farther off than this across its axis, mm. Default 1.5: less than what
+    /// separates neighbours on most parts.
+    pub match_mm: f64,
+    /// name or number of the part
+    pub part: Option<String>,
+    /// of this one part
+    pub serial: Option<String>,
+    /// who inspects
+    pub operator: Option<String>,
+}
+
+/// How the part is drawn in the report.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PartPicture {
+    /// of the coordinates in the file of its mesh
+    pub mesh_unit: MeshUnit,
+    /// from which direction; `None`: from the side that was touched
+    pub view: Option<Vector3<f64>>,
+}
+
+impl Default for InspectionParams {
+    fn default() -> Self {
+        Self {
+            drawing: DrawingParams::default(),
+            decision: DecisionParams::default(),
+            coverage_factor: 2.0,
+            match_mm: 1.5,
+            part: None,
+            serial: None,
+            operator: None,
+        }
+    }
+}
+
+impl InspectionParams {
+    /// Checks that each is possible; who refuses names the flag of the command line.
+    ///
+    /// # Errors
+    /// [`InspectionError::Setting`]
+    pub fn check(&self) -> Result<(), InspectionError> {
+        let Self { drawing, decision, coverage_factor, match_mm, .. } = self;
+        let lengths = [
+            ("--k", Some(*coverage_factor)),
+            ("--match-mm", Some(*match_mm)),
+            ("--tolerance-mm", drawing.tolerance_mm),
+            ("--position-mm", drawing.position_mm),
+        ];
+        let is_positive = |number: f64| number > 0.0 && number.is_finite();
+        for (flag, number) in lengths.into_iter().filter_map(|(flag, number)| Some((flag, number?))) {
+            if !is_positive(number) {
+                return Err(InspectionError::Setting(format!("{flag} {number} must be above 0")));
+            }
+        }
+        let confidence = decision.confidence;
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(InspectionError::Setting(format!("--confidence {confidence} must be above 0.5 and below 1")));
+        }
+        Ok(())
+    }
+}

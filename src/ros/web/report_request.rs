@@ -1,0 +1,185 @@
+//! What a page asks of a report: where nominal values are from, and what the flags of `touchup inspect` would say.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::conformity::{DecisionRule, GeneralTolerance};
+use crate::inspection::InspectionParams;
+use crate::io::mesh_file::MeshUnit;
+use crate::io::nominal_file::is_nominal_file;
+use crate::io::session_folder::SessionFolder;
+
+/// Bytes of a CAD mesh that is handed in, at most.
+const LARGEST_MESH: u64 = 64 << 20;
+/// … and of a table: some ten thousand characteristics.
+const LARGEST_TABLE: u64 = 1 << 20;
+/// Characters of a text in the head of the report at most.
+const LONGEST_TEXT: usize = 200;
+/// The files of nominal values in the folder of a session.
+const IN_SESSION: [&str; 2] = ["nominal.csv", "nominal.json"];
+
+/// Where nominal values are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum NominalSource {
+    /// the body of the request
+    Upload,
+    /// the nominal part of the node
+    Part,
+    /// a file in the folder of the session
+    Session,
+}
+
+/// The query of a request; what is left out is as on the command line.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReportRequest {
+    pub nominal: NominalSource,
+    /// name of the file that is handed in, or of that in the folder of the session
+    #[serde(default)]
+    file: String,
+    /// of a CAD mesh; left out: that of the session
+    unit: Option<MeshUnit>,
+    general: Option<String>,
+    tolerance_mm: Option<f64>,
+    position_mm: Option<f64>,
+    match_mm: Option<f64>,
+    rule: Option<String>,
+    confidence: Option<f64>,
+    k: Option<f64>,
+    part: Option<String>,
+    serial: Option<String>,
+    operator: Option<String>,
+}
+
+impl ReportRequest {
+    /// Settings of the inspection.
+    ///
+    /// - `unit`: of the session.
+    ///
+    /// # Errors
+    /// In words: what is no value.
+    pub fn params(&self, unit: MeshUnit) -> Result<InspectionParams, String> {
+        let mut params = InspectionParams::default();
+        params.drawing.unit = self.unit.unwrap_or(unit);
+        params.drawing.general = self.general.as_deref().map(general).transpose()?;
+        (params.drawing.tolerance_mm, params.drawing.position_mm) = (self.tolerance_mm, self.position_mm);
+        if params.drawing.general.is_some() && params.drawing.tolerance_mm.is_some() {
+            return Err("general and tolerance_mm exclude each other: leave one out".to_owned());
+        }
+        params.decision.rule = self.rule.as_deref().map(rule).transpose()?.unwrap_or(params.decision.rule);
+        params.decision.confidence = self.confidence.unwrap_or(params.decision.confidence);
+        params.coverage_factor = self.k.unwrap_or(params.coverage_factor);
+        params.match_mm = self.match_mm.unwrap_or(params.match_mm);
+        params.part = text("part", &self.part)?;
+        params.serial = text("serial", &self.serial)?;
+        params.operator = text("operator", &self.operator)?;
+        params.check().map_err(|error| error.to_string())?;
+        Ok(params)
+    }
+
+    /// Name of the file that is handed in, and how many bytes it may have.
+    ///
+    /// # Errors
+    /// In words: another one is needed.
+    pub fn upload(&self) -> Result<(&str, u64), String> {
+        let name = Path::new(&self.file);
+        let ending = name.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
+        let is_mesh = ["ply", "stl", "obj"].iter().any(|known| ending == *known);
+        match is_nominal_file(name) {
+            true => Ok((&self.file, LARGEST_TABLE)),
+            false if is_mesh => Ok((&self.file, LARGEST_MESH)),
+            false => Err(format!(
+                "\"{}\": hand in nominal values as .csv or .json, or a CAD mesh as .ply, .stl or .obj",
+                self.file
+            )),
+        }
+    }
+
+    /// The file in the folder of a session.
+    ///
+    /// # Errors
+    /// In words: it is no such file, or a link to elsewhere.
+    pub fn in_session(&self, session: &SessionFolder) -> Result<PathBuf, String> {
+        if IN_SESSION.contains(&&*self.file) {
+            session.place(&self.file, true).map_err(|why| why.to_string())
+        } else {
+            Err(format!("\"{}\": nominal values in the folder of a session are {}", self.file, IN_SESSION.join(" or ")))
+        }
+    }
+}
+
+fn general(name: &str) -> Result<GeneralTolerance, String> {
+    let class = GeneralTolerance::ALL.into_iter().find(|class| class.name() == name);
+    class
+        .ok_or_else(|| format!("general: take one of {}", GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")))
+}
+
+fn rule(name: &str) -> Result<DecisionRule, String> {
+    let rule = DecisionRule::ALL.into_iter().find(|rule| rule.name() == name);
+    rule.ok_or_else(|| format!("rule: take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
+}
+
+/// A text of one line; none where there is nothing in it.
+fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
+    let Some(text) = given.as_deref().map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
+    if text.chars().count() > LONGEST_TEXT || text.chars().any(char::is_control) {
+        return Err(format!("{name} has up to {LONGEST_TEXT} characters in one line"));
+    }
+    Ok(Some(text.to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(json: serde_json::Value) -> ReportRequest {
+        serde_json::from_value(json).unwrap()
+    }
+
+    /// The defaults are those that `touchup inspect --help` names.
+    #[test]
+    fn what_is_left_out_is_as_on_the_command_line() {
+        let params = request(serde_json::json!({ "nominal": "part" })).params(MeshUnit::Inch).unwrap();
+        assert_eq!((params.coverage_factor, params.match_mm), (2.0, 1.5));
+        assert_eq!((params.decision.rule.name(), params.decision.confidence), ("iso14253", 0.95));
+        assert!(params.drawing.general.is_none() && params.drawing.unit == MeshUnit::Inch && params.part.is_none());
+    }
+
+    #[test]
+    fn what_is_no_value_is_refused_in_words() {
+        for (field, value, words) in [
+            ("general", "iso2768-x".into(), "iso2768-f, iso2768-m"),
+            ("rule", "hope".into(), "iso14253"),
+            ("confidence", 0.5.into(), "above 0.5 and below 1"),
+            ("k", 0.0.into(), "--k 0 must be above 0"),
+            ("tolerance_mm", serde_json::json!(-1.0), "--tolerance-mm -1 must be above 0"),
+            ("part", "x".repeat(201).into(), "up to 200 characters"),
+            ("operator", "a\nb".into(), "in one line"),
+        ] {
+            let mut asked = serde_json::json!({ "nominal": "part" });
+            asked[field] = value;
+            let why = request(asked).params(MeshUnit::Millimetre).unwrap_err();
+            assert!(why.contains(words), "{why}");
+        }
+        let unknown = serde_json::json!({ "nominal": "part", "out": "/etc/passwd" });
+        assert!(serde_json::from_value::<ReportRequest>(unknown).is_err());
+    }
+
+    #[test]
+    fn tables_and_meshes_are_handed_in_and_nothing_else_is() {
+        let named = |file: &str| request(serde_json::json!({ "nominal": "upload", "file": file }));
+        assert_eq!(named("plate.CSV").upload().unwrap().1, 1 << 20);
+        assert_eq!(named("plate.stl").upload().unwrap().1, 64 << 20);
+        for file in ["", "plate", "plate.exe", "plate.stl.gz"] {
+            assert!(named(file).upload().is_err(), "{file}");
+        }
+        let parent = tempfile::tempdir().unwrap();
+        let session = SessionFolder::create(parent.path(), "one").unwrap();
+        assert_eq!(named("nominal.json").in_session(&session).unwrap(), session.path().join("nominal.json"));
+        for file in ["../two/nominal.csv", "features.json", "/etc/passwd", ""] {
+            assert!(named(file).in_session(&session).is_err(), "{file}");
+        }
+    }
+}

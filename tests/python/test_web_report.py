@@ -1,0 +1,276 @@
+"""The inspection report that an operator's page makes of a session: against `touchup inspect` on the same folder, and who may have one."""
+
+import http.client
+import json
+import shutil
+from urllib.parse import quote, urlencode, urlsplit
+
+import pytest
+from browser import DESKTOP, LANDSCAPE, PORTRAIT
+from conftest import ROOT
+from ros_process import play
+from test_page import page_of
+from test_web import ask, let_in
+from web_page import PageNode
+
+DRAWING = ROOT / "examples/plate_nominal.csv"
+
+
+@pytest.fixture(scope="module")
+def touched(touchup_bin, demo_folder, tmp_path_factory):
+    """A node with a nominal part after the recording of the demo, whose page lets in by link; its cookies by role; and, beside the
+    session that runs, `over`: one that is over, with what refine makes of the demo."""
+    folder = tmp_path_factory.mktemp("reported")
+    part = demo_folder / "truth.ply"
+    with PageNode(touchup_bin, folder, demo_folder / "scan.ply", "--web-links", "--web-nominal", part) as node:
+        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 8, domain=node.domain)
+        node.part, node.over = part, node.session.parent / "over"
+        shutil.copytree(demo_folder, node.over, ignore=shutil.ignore_patterns("*.mcap"))
+        node.cookies = {role: let_in(node, role) for role in ("look", "operate")}
+        yield node
+
+
+def post(node, session, query, body=b"", role="operate", **headers):
+    """Asks for a report as a page does; status and answer."""
+    place = urlsplit(node.url)
+    connection = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
+    headers = {"Origin": node.url, "Cookie": node.cookies[role], **headers}
+    connection.request("POST", f"/api/reports/{quote(session, safe='')}?{urlencode(query)}", body=body, headers=headers)
+    answer = connection.getresponse()
+    text = answer.read()
+    connection.close()
+    return answer.status, json.loads(text)
+
+
+def made(node, query, body=b""):
+    """A report of the session that runs: its results."""
+    status, said = post(node, node.session.name, query, body)
+    assert status == 200, said
+    assert said == {"files": ["report.html", "results.csv", "results.json", "results.qif"], "was_saved": True}
+    return results(node.session)
+
+
+def results(folder):
+    return json.loads((folder / "results.json").read_text())
+
+
+def by_command(touchup, folder, *arguments):
+    """What `touchup inspect` says of a folder."""
+    ran = touchup("inspect", folder, *arguments, "--json")
+    assert ran.returncode in (0, 4), ran.stderr
+    return json.loads(ran.stdout)
+
+
+def without_date(record):
+    return {name: value for name, value in record.items() if name != "date"}
+
+
+def test_a_report_of_nominal_values_in_the_session_is_that_of_the_command(touched, touchup):
+    shutil.copy(DRAWING, touched.session / "nominal.csv")
+    head = {"part": "Plate 4711", "serial": "SN 1", "operator": "R. Ö"}
+    found = made(touched, {"nominal": "session", "file": "nominal.csv", **head})
+    flags = [word for name, value in head.items() for word in (f"--{name}", value)]
+    expected = by_command(touchup, touched.session, "--nominal", touched.session / "nominal.csv", *flags)
+    assert without_date(found) == without_date(expected)
+    assert len(found["characteristics"]) == 13
+    for name in ["results.csv", "results.qif"]:
+        touchup("inspect", touched.session, "--nominal", touched.session / "nominal.csv", *flags, f"--{name[8:]}", touched.session / f"x{name[7:]}")
+    assert (touched.session / "results.csv").read_bytes() == (touched.session / "x.csv").read_bytes()
+
+
+def test_a_report_of_the_nodes_nominal_part_is_that_of_the_command(touched, touchup):
+    found = made(touched, {"nominal": "part", "general": "iso2768-f", "position_mm": "0.2", "confidence": "0.9"})
+    flags = ["--nominal", touched.part, "--general", "iso2768-f", "--position-mm", "0.2", "--confidence", "0.9"]
+    assert without_date(found) == without_date(by_command(touchup, touched.session, *flags))
+    assert found["confidence"] == 0.9
+
+
+@pytest.mark.parametrize("name", ["drawing.csv", "part.ply"])
+def test_nominal_values_that_are_handed_in_are_named_as_they_were_called_and_do_not_stay(touched, touchup, name):
+    source = DRAWING if name.endswith("csv") else touched.part
+    query = {"nominal": "upload", "file": name, "general": "iso2768-m"}
+    found = made(touched, query, source.read_bytes())
+    expected = by_command(touchup, touched.session, "--nominal", source, "--general", "iso2768-m")
+    drawing = found["files"][0]
+    assert drawing["path"] == name and drawing["bytes"] == source.stat().st_size
+    # the file itself, its length and its checksum are the same: only its name is another one
+    expected["files"][0]["path"] = name
+    assert without_date(found) == without_date(expected)
+    assert not [left for left in touched.session.iterdir() if left.name.startswith(".upload")]
+
+
+def test_a_session_that_is_over_has_a_report_of_its_own_files(touched, touchup):
+    status, said = post(touched, "over", {"nominal": "upload", "file": "d.csv"}, DRAWING.read_bytes())
+    assert (status, said["was_saved"]) == (200, False)
+    expected = by_command(touchup, touched.over, "--nominal", DRAWING)
+    expected["files"][0]["path"] = "d.csv"
+    assert without_date(results(touched.over)) == without_date(expected)
+    # as docs/inspect.md has it
+    assert expected["counts"] == {"pass": 11, "fail": 1, "undecided": 1}
+
+
+def test_who_only_looks_opens_reports_and_makes_none(touched):
+    made(touched, {"nominal": "part", "general": "iso2768-m"})
+    status, said = post(touched, touched.session.name, {"nominal": "part", "general": "iso2768-m"}, role="look")
+    assert status == 403 and "may look and not operate" in said["error"]
+    address = f"/api/reports/{touched.session.name}"
+    status, headers, text = ask(touched.url, address, Cookie=touched.cookies["look"])
+    assert (status, text) == (200, (touched.session / "report.html").read_bytes())
+    assert headers["content-type"].startswith("text/html")
+    policy = headers["content-security-policy"]
+    assert policy.startswith("sandbox; default-src 'none'") and "script-src" not in policy and "frame-ancestors 'none'" in policy
+    assert "allow-" not in policy
+    assert ask(touched.url, address)[0] == 401
+    assert ask(touched.url, "/api/reports/missing", Cookie=touched.cookies["look"])[0] == 404
+
+
+def test_a_report_is_made_for_our_own_page_alone(touched):
+    query = {"nominal": "part", "general": "iso2768-m"}
+    for origin in ["http://evil.example", "null", touched.url + "0"]:
+        status, said = post(touched, touched.session.name, query, Origin=origin)
+        assert status == 403 and "another page" in said["error"]
+    path = f"/api/reports/{touched.session.name}?{urlencode(query)}"
+    status, _, text = ask(touched.url, path, method="POST", Cookie=touched.cookies["operate"])
+    assert status == 403 and b"without Origin" in text
+    assert post(touched, touched.session.name, query, Cookie="x=1")[0] == 401
+
+
+def test_names_that_lead_out_of_the_session_are_refused(touched, tmp_path):
+    upload = {"nominal": "upload", "file": "d.csv"}
+    for session in ["..", "../..", "/etc", ".hidden", "linked2", "", "missing", "a\0b"]:
+        (touched.session.parent / "linked2").exists() or (touched.session.parent / "linked2").symlink_to(tmp_path)
+        status, said = post(touched, session, upload, b"x") if session else (404, {})
+        assert status in (400, 404), (session, said)
+    for file in ["../d.csv", "/etc/d.csv", "a/b.csv", ".d.csv", "a\0.csv", 'a".csv']:
+        status, said = post(touched, touched.session.name, {"nominal": "upload", "file": file}, b"x")
+        assert status == 400, (file, said)
+    for file in ["../nominal.csv", "/etc/passwd", "features.json", ""]:
+        status, said = post(touched, touched.session.name, {"nominal": "session", "file": file})
+        assert status == 400 and "nominal.csv or nominal.json" in said["error"], said
+    assert list(tmp_path.iterdir()) == []
+    # a link in the folder of the session is not written through
+    over = touched.session.parent / "linking"
+    over.mkdir()
+    (over / "report.html").symlink_to(tmp_path / "out.html")
+    status, said = post(touched, "linking", upload, DRAWING.read_bytes())
+    assert status == 400 and "no plain file" in said["error"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_too_large_is_refused_before_it_comes_and_while_it_comes(touched):
+    for file, most in [("a.csv", 1 << 20), ("a.stl", 64 << 20)]:
+        path = f"/api/reports/{touched.session.name}?{urlencode({'nominal': 'upload', 'file': file})}"
+        status, _, text = ask(
+            touched.url, path, method="POST", Origin=touched.url, Cookie=touched.cookies["operate"], Content_Length=str(most + 1)
+        )
+        assert status == 413 and b"may have up to" in text
+    # without a length: cut off when it is over
+    body = (b"x" * 65536 for _ in range(17))
+    try:
+        status, said = post(touched, touched.session.name, {"nominal": "upload", "file": "a.csv"}, body)
+        assert status == 413, said
+    except (BrokenPipeError, ConnectionResetError):
+        # it was closed before all was sent
+        pass
+    assert not [left for left in touched.session.iterdir() if left.name.startswith(".upload")]
+
+
+def test_what_is_wrong_is_said_in_the_words_of_the_command(touched, touchup, tmp_path):
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text(DRAWING.read_text().replace("diameter_mm", "girth_mm", 1))
+    ran = touchup("inspect", touched.session, "--nominal", wrong)
+    assert ran.returncode == 3
+    status, said = post(touched, touched.session.name, {"nominal": "upload", "file": "wrong.csv"}, wrong.read_bytes())
+    assert status == 400
+    assert said["error"] == ran.stderr.strip().removeprefix("touchup: ").replace(str(wrong), "wrong.csv")
+    for query, words in [
+        ({"nominal": "part"}, "a CAD mesh has no tolerances"),
+        ({"nominal": "part", "confidence": "0.3"}, "--confidence 0.3 must be above 0.5"),
+        ({"nominal": "part", "general": "iso2768-x"}, "take one of iso2768-f"),
+        ({"nominal": "part", "shell": "1"}, "shell"),
+        ({"nominal": "hope"}, "hope"),
+        ({}, "nominal"),
+        ({"nominal": "upload", "file": "a.exe"}, ".csv or .json"),
+    ]:
+        status, said = post(touched, touched.session.name, query)
+        assert status == 400 and words in said["error"], said
+
+
+def test_sessions_say_when_they_began(touched):
+    _, _, text = ask(touched.url, "/api/sessions", Cookie=touched.cookies["look"])
+    (listed,) = [session for session in json.loads(text) if session["is_current"]]
+    # the name of a session is the time of its beginning, with dashes for colons
+    day, clock = listed["name"].rstrip("Z").split("T")
+    assert listed["begun"] == f"{day}T{clock.replace('-', ':')}Z"
+
+
+def test_an_operator_makes_a_report_by_clicks_and_sees_the_decisions(browser, touched, tmp_path):
+    page = page_of(browser, touched, size=DESKTOP)
+    page.get_by_role("button", name="Sessions").click()
+    entry = page.locator(".session").filter(has=page.locator("summary strong", has_text="over"))
+    entry.locator("summary").click()
+    entry.get_by_role("button", name="Report").click()
+    dialog = page.get_by_role("dialog", name="Inspection report")
+    dialog.get_by_label("Nominal values from").select_option("upload")
+    dialog.get_by_label("Table (CSV, JSON)").set_input_files(DRAWING)
+    dialog.get_by_label("Part", exact=True).fill("Plate <4711>")
+    dialog.get_by_label("Operator").fill("R. Ö")
+    dialog.get_by_role("button", name="Make the report").click()
+    dialog.get_by_role("status").filter(has_text="in the session's folder").wait_for()
+    result = dialog.get_by_role("region", name="Result of the inspection")
+    result.locator("strong", has_text="11 pass, 1 fail, 1 undecided").wait_for()
+    found = results(touched.over)
+    assert (found["part"], found["operator"]) == ("Plate <4711>", "R. Ö")
+    rows = result.locator(".decisions li").all_inner_texts()
+    assert [row.split()[0] for row in rows] == ["fail", "undecided"] + 11 * ["pass"]
+    assert "blind hole diameter" in rows[0] and "slot width" in rows[1]
+    page.screenshot(path=tmp_path / "report.png")
+    with page.context.expect_page() as opening:
+        result.get_by_role("link", name="Open the report").click()
+    report = opening.value
+    report.wait_for_load_state()
+    assert report.url.endswith("/api/reports/over")
+    assert "Plate <4711>" in report.locator("h1 + dl").inner_text()
+    report.screenshot(path=tmp_path / "html.png")
+    report.close()
+    with page.expect_download() as saving:
+        result.get_by_role("link", name="CSV").click()
+    assert saving.value.suggested_filename == "results.csv"
+    # what the node refuses is shown in its words
+    dialog.get_by_label("Probability").fill("20")
+    dialog.get_by_role("button", name="Make the report").click()
+    dialog.get_by_role("alert").wait_for()
+    assert "must be above 0.5" in dialog.get_by_role("alert").inner_text()
+    assert page.wrong == []
+    page.context.close()
+
+
+def test_the_session_that_runs_is_saved_for_its_report_from_the_bar(browser, touched, tmp_path):
+    page = page_of(browser, touched, size=LANDSCAPE)
+    page.get_by_role("navigation").get_by_role("button", name="Report").click()
+    dialog = page.get_by_role("dialog", name="Inspection report")
+    dialog.get_by_label("Nominal values from").select_option("part")
+    assert dialog.get_by_label("General tolerance").input_value() == "iso2768-m"
+    before = (touched.session / "results.json").stat().st_mtime_ns if (touched.session / "results.json").exists() else 0
+    dialog.get_by_role("button", name="Make the report").click()
+    dialog.get_by_role("status").filter(has_text="Saved; the report").wait_for()
+    assert (touched.session / "results.json").stat().st_mtime_ns > before
+    assert results(touched.session)["files"][0]["path"] == str(touched.part)
+    page.screenshot(path=tmp_path / "bar.png")
+    assert page.wrong == []
+    page.context.close()
+
+
+def test_who_only_looks_sees_the_result_and_no_form(browser, touched, tmp_path):
+    made(touched, {"nominal": "part", "general": "iso2768-m"})
+    page = page_of(browser, touched, role="look", size=PORTRAIT, language="de")
+    page.get_by_role("button", name="Sitzungen").click()
+    entry = page.locator(".session", has_text=touched.session.name)
+    entry.locator("summary").click()
+    entry.get_by_role("button", name="Prüfbericht").click()
+    dialog = page.get_by_role("dialog", name="Prüfbericht")
+    dialog.get_by_role("link", name="Bericht öffnen").wait_for()
+    assert not dialog.get_by_role("button", name="Bericht erstellen").is_visible()
+    page.screenshot(path=tmp_path / "look.png")
+    assert page.wrong == []
+    page.context.close()
