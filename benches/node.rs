@@ -132,7 +132,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
 /// The same beside pages, by turns, so that what else the machine does falls on all of them.
 #[cfg(feature = "web")]
 fn beside_pages(faces: usize) {
-    use touchup::ros::web::{NodeFacts, WebParams, start};
+    use touchup::ros::web::{NodeFacts, WebParams, WebServer};
     for turn in 0..3 {
         for kind in ["no page", "a page that reads", "a page that never reads"] {
             let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
@@ -143,7 +143,8 @@ fn beside_pages(faces: usize) {
             let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
             let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal: None };
-            let (port, page) = start(&params, facts, inbox, ready.whole_mesh(), port, |_| ()).expect("a port is free");
+            let page = WebServer::open(&params, |_| ()).expect("a port is free");
+            let port = page.serve_node(facts, inbox, ready.whole_mesh(), port).expect("the services have names");
             let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
             let _stuck = match kind {
                 "no page" => None,

@@ -34,6 +34,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
+    ("input_check", "stylus mesh diagnose threads scene replay"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io scan"),
     (
         "report",
@@ -43,13 +44,13 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scan scene session",
+         calibrate compare diagnose io scan scene session replay input_check",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay ros ros2_control ur",
+         calibrate compare diagnose io threads scan scene session replay input_check ros ros2_control ur",
     ),
 ];
 

@@ -1,19 +1,17 @@
 //! What all pages share: what they are shown, who may ask what, and what the page answers by itself.
 
-use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use qrcode::QrCode;
-use qrcode::render::unicode::Dense1x2;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::access::{Access, Role};
+use super::access::Role;
 use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
 use super::calls::{Answer, Calls, MAY_ONLY_LOOK};
+use super::entrance::Entrance;
 use super::nominal::Nominal;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Inbox;
@@ -24,7 +22,7 @@ pub(super) struct Site {
     pub board: Board,
     pub calls: Calls,
     pub inbox: Inbox,
-    pub access: Access,
+    pub entrance: Arc<Entrance>,
     pub annotations: Annotations,
     pub nominal: Option<Arc<Nominal>>,
     pub scan: ScanShown,
@@ -33,12 +31,6 @@ pub(super) struct Site {
     pub session_folder: PathBuf,
     /// pages that are open
     pub pages: AtomicUsize,
-    /// … and that were ever opened
-    pub pages_so_far: AtomicU64,
-    /// address of the page: for links
-    pub base: String,
-    /// tells the operator beside the machine
-    pub notify: fn(&str),
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -112,40 +104,14 @@ impl Site {
             role: Role,
         }
         let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        if !self.access.needs_cookie() {
-            return Ok(json!({ "link": self.base }));
+        let entrance = &self.entrance;
+        if !entrance.access.needs_cookie() {
+            return Ok(json!({ "link": entrance.base }));
         }
-        let secret = self.access.invite(role).map_err(|error| error.to_string())?;
-        Ok(json!({ "link": self.link(secret.text()) }))
-    }
-
-    fn link(&self, token: &str) -> String {
-        format!("{}/pair?token={token}", self.base)
-    }
-
-    /// Somebody came in by a link, which is used up: here is the next.
-    pub fn note_paired(&self, role: Role) {
-        match self.invitation(role) {
-            Ok(text) => (self.notify)(&format!("a page was let in to {}; {text}", in_words(role))),
-            Err(error) => tracing::warn!(%error, "there is no new link"),
-        }
-    }
-
-    /// A new link in words, and as a QR code.
-    pub fn invitation(&self, role: Role) -> io::Result<String> {
-        let link = self.link(self.access.invite(role)?.text());
-        let code = QrCode::new(&link).map(|code| code.render::<Dense1x2>().build()).unwrap_or_default();
-        let code = if role == Role::Operate { format!("\n{code}") } else { String::new() };
-        Ok(format!("the next one may {} by {link}{code}", in_words(role)))
+        let secret = entrance.access.invite(role).map_err(|error| error.to_string())?;
+        Ok(json!({ "link": entrance.link(secret.text()) }))
     }
 }
 
 /// What the page itself is asked, and not the node.
 type OwnCall = fn(&Site, Value) -> Result<Value, String>;
-
-fn in_words(role: Role) -> &'static str {
-    match role {
-        Role::Look => "look",
-        Role::Operate => "operate",
-    }
-}
