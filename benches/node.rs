@@ -133,7 +133,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
 /// The same beside pages, by turns, so that what else the machine does falls on all of them.
 #[cfg(feature = "web")]
 fn beside_pages(faces: usize, turns: usize) {
-    use touchup::ros::web::{NodeFacts, WebParams, start};
+    use touchup::ros::web::{NodeFacts, WebParams, WebServer};
     let kinds = ["no page", "a page that reads", "a page that never reads"];
     let mut p99 = kinds.map(|_| Vec::new());
     for turn in 0..turns {
@@ -147,7 +147,8 @@ fn beside_pages(faces: usize, turns: usize) {
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
             let (scan_mesh, mesh_unit) = (ready.scan_mesh(), ready.mesh_unit());
             let facts = NodeFacts { scan, scan_mesh, session_folder, nominal: None, nominal_file: None, mesh_unit };
-            let (port, page) = start(&params, facts, inbox, ready.whole_mesh(), port, |_| ()).expect("a port is free");
+            let page = WebServer::open(&params, |_| ()).expect("a port is free");
+            let port = page.serve_node(facts, inbox, ready.whole_mesh(), port).expect("the services have names");
             let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
             let _stuck = match kind {
                 "no page" => None,

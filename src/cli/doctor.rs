@@ -1,6 +1,5 @@
 //! `touchup doctor`: what is wrong with a recording, before anything is made of it.
 
-use std::cell::RefCell;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -11,14 +10,12 @@ use super::offsets::WrenchOffset;
 use super::progress::WorkProgress;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
-use crate::diagnose::{InputFinding, InputMonitor};
+use crate::diagnose::InputFinding;
+use crate::input_check::{InputCheck, check_input};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::{StampSource, Topics};
-use crate::mesh::FaceTree;
-use crate::replay::{Recording, each_sample, marker_filter};
+use crate::replay::{Recording, marker_filter};
 use crate::scan::read_scan;
-use crate::stylus::{ContactEstimator, ContactEstimatorParams};
-use crate::threads::Threads;
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
@@ -88,38 +85,15 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
     let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
     let recording = Recording::open(&arguments.recording, &topics, arguments.stamp)?;
-    let params = scene.input_monitor_params(recording.wrench_frame);
-    let monitor = RefCell::new(InputMonitor::new(params)?);
-    let contact = ContactEstimatorParams {
-        compensator: params.compensator,
-        gate: Some(scene.contact.unwrap_or_default()),
-        ..ContactEstimatorParams::new(params.tip)
-    };
-    let mut estimator = ContactEstimator::new(contact)?;
     let mut progress = WorkProgress::new("replay", recording.message_count());
-    let replayed = each_sample(
-        recording,
-        scene.placement(),
-        scene.sync_params(),
-        markers,
-        &mut || progress.step(),
-        &mut |message| monitor.borrow_mut().message(message),
-        |sample| {
-            let mut monitor = monitor.borrow_mut();
-            monitor.sample(sample);
-            if let Ok(contact) = estimator.observe(sample) {
-                monitor.contact(contact);
-            }
-        },
-    )?;
-    let monitor = monitor.into_inner();
-    let wrench_offset = monitor.clock_offset().map(|found| WrenchOffset::of(&found, &scene.sync_params()));
-    let findings = monitor.findings(&scan, &FaceTree::new_by(&scan, &Threads));
+    let found = check_input(recording, &scan, &scene, markers, &mut || progress.step())?;
+    let InputCheck { findings, clock_offset, losses } = found;
+    let wrench_offset = clock_offset.map(|found| WrenchOffset::of(&found, &scene.sync_params()));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
     let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_offset, findings };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
-    Ok(replayed.losses)
+    Ok(losses)
 }
 
 /// Refuses an input of which something is surely wrong.

@@ -231,7 +231,7 @@ errors_of_rooms! {
 #[cfg(feature = "web")]
 errors_of_rooms! {
     crate::ros::web::WebError => |error| match error {
-        crate::ros::web::WebError::Certificate { .. } => ("web", 3),
+        crate::ros::web::WebError::Certificate { .. } | crate::ros::web::WebError::Setup(_) => ("web", 3),
         _ => ("web", 1),
     }, "";
 }

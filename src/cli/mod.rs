@@ -24,6 +24,8 @@ mod offsets;
 mod output;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod page;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod path_parameter;
 mod pictures;
 mod probe;
 mod probing;
@@ -34,6 +36,8 @@ mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
 mod report;
+#[cfg(feature = "web")]
+mod set_up;
 mod signals;
 mod simulate;
 mod simulated_world;

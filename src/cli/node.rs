@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
-use super::page::path;
+use super::path_parameter::path;
 use super::signals::end_on_signals;
 use super::told::{ToldBy, ToldNumbers};
 use super::web::WebFlags;
@@ -31,6 +31,10 @@ pub(super) struct NodeArguments {
     tip_radius_mm: Option<f64>,
     #[command(flatten)]
     web: WebFlags,
+    /// Where scans lie that can be chosen on the page when none is named, and where the page puts scans and scene.yaml; default: the
+    /// current folder
+    #[arg(long, value_name = "FOLDER", requires = "web")]
+    web_scans: Option<PathBuf>,
     /// Prints the report of the session as one JSON object
     #[arg(long)]
     json: bool,
@@ -47,7 +51,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     if !config.unused.is_empty() {
         tracing::warn!("the parameter files name what this node does not have: {}", config.unused.join(", "));
     }
-    let ready = Prepared::new(config.parameters.clone())?;
+    let (ready, opened) = arguments.web.prepared(arguments.web_scans.as_deref(), &mut config.parameters)?;
     let (scan, faces) = ready.scan();
     print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
     print_result(&arguments.told(&config, &ready).to_string())?;
@@ -55,7 +59,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let port = ros::start(&config, inbox.clone())?;
-    let (port, _page) = arguments.web.serve(&ready, inbox, port)?;
+    let (port, _page) = arguments.web.serve(opened, &ready, inbox, port)?;
     let arm = arm_of(&config, ready.scene())?;
     let running = ready.start(port, arrivals, arm)?;
     let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
@@ -95,7 +99,8 @@ impl NodeArguments {
     /// What the mesh will depend on, and who told it.
     fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
         let is_set = config.parameters.double("tip_radius_mm") > 0.0;
-        let radius_by = self.tip_radius_mm.map(|_| ToldBy::Flag).or(is_set.then_some(ToldBy::Parameter));
+        let by_flag = self.tip_radius_mm.filter(|_| is_set);
+        let radius_by = by_flag.map(|_| ToldBy::Flag).or(is_set.then_some(ToldBy::Parameter));
         // without a scene the defaults are nobody's word
         let yaml = if config.parameters.string("scene").is_empty() { "" } else { ready.scene_yaml() };
         ToldNumbers::of(ready.scene(), yaml, [radius_by, None, None])

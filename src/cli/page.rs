@@ -4,6 +4,7 @@ use std::path::Path;
 use std::thread::{Builder, sleep};
 use std::time::Duration;
 
+use super::path_parameter::path;
 use super::replay::play;
 use super::signals::end_on_signals;
 use super::web::WebFlags;
@@ -33,7 +34,7 @@ pub(super) fn on_page(
     let (inbox, arrivals) = inbox(INBOX, &clock);
     end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
     let (port, touching) = in_process::start_unread(inbox.clone(), &clock);
-    let (port, page) = web.serve(&ready, inbox, port)?;
+    let (port, page) = web.serve(None, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, None)?;
     notify("the touching begins when the page is open; Ctrl-C saves and ends it");
     let touch = move || {
@@ -63,10 +64,4 @@ pub(super) fn parameters_of(scan: &Path, unit: MeshUnit, sessions: &Path) -> Res
         parameters.set(name, &value).map_err(CliError::usage)?;
     }
     Ok(parameters)
-}
-
-/// A path as a parameter.
-pub(super) fn path(path: &Path) -> Result<ParameterValue, CliError> {
-    let why = || CliError::usage(format!("{}: parameters of ROS are UTF-8, rename the file", path.display()));
-    Ok(ParameterValue::String(path.to_str().ok_or_else(why)?.to_owned()))
 }

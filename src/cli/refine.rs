@@ -14,7 +14,9 @@ use tracing::{debug, warn};
 use super::doctor::{UNSOUND, refuse_unsound};
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use super::page::{on_page, parameters_of, path};
+use super::page::{on_page, parameters_of};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use super::path_parameter::path;
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
 use super::told::{ToldFlags, ToldNumbers};

@@ -1,7 +1,7 @@
 //! `--web`: where the operator's page is served, of every verb that has one.
 
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
@@ -9,15 +9,18 @@ use clap::Args;
 use super::CliError;
 #[cfg(feature = "web")]
 use super::notify;
-#[cfg(not(feature = "web"))]
 use super::require;
+#[cfg(feature = "web")]
+use super::set_up::{set_up, set_up_on_page};
 use crate::ros::inbox::Inbox;
 use crate::ros::node::Prepared;
+use crate::ros::parameters::Parameters;
 use crate::ros::port::Port;
 #[cfg(feature = "web")]
-use crate::ros::web::{Certificate, NodeFacts, WebParams, WebServer, start};
+use crate::ros::web::{Certificate, NodeFacts, WebParams, WebServer};
 #[cfg(feature = "web")]
 use crate::scan::read_scan;
+use crate::scene::Scene;
 
 /// There is none.
 #[cfg(not(feature = "web"))]
@@ -73,10 +76,54 @@ impl WebFlags {
         Self { web_nominal: self.web_nominal.clone().or(Some(mesh)), ..self.clone() }
     }
 
+    /// Whether the setup on the page is needed: a page is wanted, and nobody named a scan.
+    ///
+    /// # Errors
+    /// The scene cannot be used.
+    fn needs_setup(&self, parameters: &Parameters) -> Result<bool, CliError> {
+        if !self.is_wanted() || !parameters.string("scan").is_empty() {
+            return Ok(false);
+        }
+        let scene = Path::new(parameters.string("scene"));
+        Ok(scene.as_os_str().is_empty() || Scene::read(scene)?.scan_file(scene).is_none())
+    }
+
+    /// A node that is ready to start: as the parameters have it, or of the page.
+    #[cfg(not(feature = "web"))]
+    pub fn prepared(
+        &self,
+        _: Option<&Path>,
+        parameters: &mut Parameters,
+    ) -> Result<(Prepared, Option<WebServer>), CliError> {
+        require(!self.needs_setup(parameters)?, NOT_BUILT)?;
+        Ok((Prepared::new(parameters.clone())?, None))
+    }
+
+    /// A node that is ready to start: as the parameters have it, or where those name no scan, as it is set up on the page, which then is
+    /// served already.
+    ///
+    /// - `scans`: where scans lie.
+    #[cfg(feature = "web")]
+    pub fn prepared(
+        &self,
+        scans: Option<&Path>,
+        parameters: &mut Parameters,
+    ) -> Result<(Prepared, Option<WebServer>), CliError> {
+        if !self.needs_setup(parameters)? {
+            require(scans.is_none(), "--web-scans is for a node without a scan, and one is named")?;
+            return Ok((Prepared::new(parameters.clone())?, None));
+        }
+        let Some(server) = self.listening()? else { return Ok((Prepared::new(parameters.clone())?, None)) };
+        let setup = set_up(&server, scans.unwrap_or(Path::new(".")), parameters)?;
+        self.announce(&server);
+        Ok((set_up_on_page(&setup, parameters)?, Some(server)))
+    }
+
     /// The port for the node: no page is wanted, or this program has none.
     #[cfg(not(feature = "web"))]
     pub fn serve(
         &self,
+        _: Option<WebServer>,
         _: &Prepared,
         _: Inbox,
         network: Arc<dyn Port>,
@@ -86,33 +133,60 @@ impl WebFlags {
     }
 
     /// Serves the page where it is wanted, and says where: the port for the node.
+    ///
+    /// - `opened`: the server, where there is one already.
     #[cfg(feature = "web")]
     pub fn serve(
         &self,
+        opened: Option<WebServer>,
         ready: &Prepared,
         inbox: Inbox,
         network: Arc<dyn Port>,
     ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {
-        let Some(address) = self.web else { return Ok((network, None)) };
-        let certificate = self.web_certificate.clone().zip(self.web_key.clone());
-        let certificate = certificate.map(|(chain, key)| Certificate { chain, key });
-        let is_open = certificate.is_none() && !address.ip().is_loopback();
-        let scan = ready.scan().0.to_owned();
-        let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, ready.mesh_unit()));
         let nominal = nominal.transpose().map_err(CliError::truth)?.map(|scan| scan.mesh);
+        let (server, was_open) = match opened {
+            Some(server) => (server, true),
+            None => match self.listening()? {
+                Some(server) => (server, false),
+                None => return Ok((network, None)),
+            },
+        };
+        let scan = ready.scan().0.to_owned();
+        let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let (nominal_file, mesh_unit) = (self.web_nominal.clone(), ready.mesh_unit());
         let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal, nominal_file, mesh_unit };
+        let port = server.serve_node(facts, inbox, ready.whole_mesh(), network)?;
+        if !was_open {
+            self.announce(&server);
+        }
+        Ok((port, Some(server)))
+    }
+
+    #[cfg(feature = "web")]
+    fn certificate(&self) -> Option<Certificate> {
+        let files = self.web_certificate.clone().zip(self.web_key.clone());
+        files.map(|(chain, key)| Certificate { chain, key })
+    }
+
+    /// The server, where a page is wanted; nobody has been told of it.
+    #[cfg(feature = "web")]
+    fn listening(&self) -> Result<Option<WebServer>, CliError> {
+        let Some(address) = self.web else { return Ok(None) };
         let by_link = self.web_links || !address.ip().is_loopback();
-        let params = WebParams { address, names: self.web_name.clone(), by_link, certificate };
-        let (port, server) = start(&params, facts, inbox, ready.whole_mesh(), network, notify)?;
+        let params = WebParams { address, names: self.web_name.clone(), by_link, certificate: self.certificate() };
+        Ok(Some(WebServer::open(&params, notify)?))
+    }
+
+    /// Says where the page is, and by which links it lets in.
+    #[cfg(feature = "web")]
+    fn announce(&self, server: &WebServer) {
         notify(&format!("page: {}", server.url()));
         server.invitations().iter().for_each(|invitation| notify(invitation));
-        if is_open {
+        if self.certificate().is_none() && self.web.is_some_and(|address| !address.ip().is_loopback()) {
             notify(
                 "the page is not encrypted: use it in a network of your own, or give --web-certificate and --web-key",
             );
         }
-        Ok((port, Some(server)))
     }
 }

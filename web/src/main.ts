@@ -1,17 +1,35 @@
-/** Where the page begins: its style, its line to the node, its parts. */
+/** Where the page begins: its style, then its line to the node and its parts, or the setup where there is no node yet. */
 import "./theme.css";
 import "./style.css";
 import { Connection } from "./connection";
 import { t } from "./language";
 import { buildPage } from "./page";
+import { applyTheme } from "./settings_menu";
+import { buildSetupPage } from "./setup_page";
+import { askSetup } from "./setup_state";
 
 const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`;
-const connection = new Connection(address);
-try {
-  buildPage(connection);
-  connection.connect();
-} catch (error) {
-  // most likely no WebGL: without it there is nothing to see
-  console.error(error);
-  document.body.textContent = t("noPicture");
+void begin();
+
+async function begin(): Promise<void> {
+  applyTheme();
+  const setup = await askSetup();
+  if (setup !== null && setup !== "running") return buildSetupPage(setup);
+  const connection = new Connection(address);
+  try {
+    buildPage(connection);
+    connection.connect();
+  } catch (error) {
+    // most likely no WebGL: without it there is nothing to see
+    console.error(error);
+    document.body.textContent = t("noPicture");
+    return;
+  }
+  connection.onState(({ kind }) => kind === "waiting" && void reloadForSetup());
+}
+
+/** A program that was started again may have no node yet. */
+async function reloadForSetup(): Promise<void> {
+  const setup = await askSetup();
+  if (setup !== null && setup !== "running") location.reload();
 }

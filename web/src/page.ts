@@ -23,7 +23,7 @@ import { Sessions } from "./sessions";
 import { settings } from "./settings";
 import { Setup } from "./setup";
 import { Share } from "./share";
-import { applyTheme, StatusBar } from "./status_bar";
+import { StatusBar } from "./status_bar";
 import { TakeOut } from "./take_out";
 import { installTestHook } from "./test_hook";
 import { isTouched } from "./touch_choice";
@@ -36,7 +36,6 @@ const CALM = 200;
 const NEAR = 0.05;
 
 export function buildPage(connection: Connection): void {
-  applyTheme();
   const store = new MeshStore();
   const model = new Model(connection);
   const notices = new Notices();

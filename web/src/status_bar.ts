@@ -3,15 +3,14 @@
  * if not, who looks and who operates, language and theme.
  */
 import { button, el, say, write } from "./dom";
-import { language, onLanguage, speak, t } from "./language";
+import { onLanguage, t } from "./language";
 import type { Model } from "./model";
-import { keep, settings, type Settings } from "./settings";
-import { LANGUAGE_NAMES, LANGUAGES, type Language, type TextKey } from "./texts";
+import { settingsMenu } from "./settings_menu";
+import type { TextKey } from "./texts";
 
 const INPUT_TEXTS: TextKey[] = ["inputGood", "inputDoubtful", "inputWrong", "inputStale"];
 /** What is over sooner, in messages of one each second, does not push the picture down. */
 const ENDURED = 3;
-const THEMES: Record<Settings["theme"], TextKey> = { auto: "themeAuto", light: "themeLight", dark: "themeDark" };
 
 export class StatusBar {
   readonly element: HTMLElement;
@@ -26,13 +25,13 @@ export class StatusBar {
 
   constructor(
     private readonly model: Model,
-    private readonly onTheme: () => void,
+    onTheme: () => void,
     onSetup: () => void,
     onShare: () => void,
   ) {
     const setup = button("check", "setupOpen", onSetup, "square", true);
     const share = button("share", "share", onShare, "square", true);
-    const right = el("div", { class: "choices" }, setup, share, this.settings());
+    const right = el("div", { class: "choices" }, setup, share, settingsMenu(onTheme));
     this.element = el("header", { class: "bar" }, this.part, this.line, this.input, this.role, right);
     model.on(["diagnostics"], () => (this.badSince = (model.input?.level ?? 0) > 0 ? this.badSince + 1 : 0));
     model.on(["state", "line", "diagnostics"], () => this.show());
@@ -55,53 +54,4 @@ export class StatusBar {
     this.remedy.hidden = this.badSince < ENDURED || !(level > 0) || line.kind !== "connected";
     if (!this.remedy.hidden) this.remedy.replaceChildren(el("strong", {}, `${this.input.textContent}: `), input?.message ?? "");
   }
-
-  /** Language and theme, behind one button. */
-  private settings(): HTMLElement {
-    const row = (text: TextKey, id: string, choice: HTMLSelectElement): HTMLElement => {
-      choice.id = id;
-      return el("div", { class: "field" }, el("label", { text, attributes: { for: id } }), choice);
-    };
-    const popover = el(
-      "div",
-      { class: "popover", attributes: { hidden: "" } },
-      row("language", "language", this.languages()),
-      row("theme", "theme", this.themes()),
-    );
-    const open = button("menu", "settings", () => show(popover.hidden), "square", true);
-    const show = (isShown: boolean): void => {
-      popover.hidden = !isShown;
-      open.setAttribute("aria-expanded", String(isShown));
-    };
-    show(false);
-    const all = el("div", { class: "settings" }, open, popover);
-    all.addEventListener("keydown", (event) => event.key === "Escape" && show(false));
-    document.addEventListener("pointerdown", (event) => all.contains(event.target as Node) || show(false));
-    return all;
-  }
-
-  private languages(): HTMLSelectElement {
-    const choice = el("select");
-    for (const name of LANGUAGES) choice.append(el("option", { attributes: { value: name, lang: name } }, LANGUAGE_NAMES[name]));
-    choice.value = language();
-    choice.addEventListener("change", () => speak(choice.value as Language));
-    return choice;
-  }
-
-  private themes(): HTMLSelectElement {
-    const choice = el("select");
-    for (const [name, text] of Object.entries(THEMES)) choice.append(el("option", { text, attributes: { value: name } }));
-    choice.value = settings.theme;
-    choice.addEventListener("change", () => {
-      keep({ theme: choice.value as Settings["theme"] });
-      applyTheme();
-      this.onTheme();
-    });
-    return choice;
-  }
-}
-
-/** Before anything asks the style sheet for a colour. */
-export function applyTheme(): void {
-  document.documentElement.dataset.theme = settings.theme;
 }

@@ -4,6 +4,8 @@
  * Words are those of the trade where it has them (ISO 286, ISO 1101, ISO 14253), and plain ones else.
  */
 
+import { setupTexts } from "./texts_setup";
+
 export const LANGUAGES = ["en", "de", "es"] as const;
 export type Language = (typeof LANGUAGES)[number];
 /** Each in its own language. */
@@ -12,6 +14,7 @@ export const LANGUAGE_NAMES: Record<Language, string> = { en: "English", de: "De
 type Row = readonly [en: string, de: string, es: string];
 
 export const texts = {
+  ...setupTexts,
   // the bar at the top
   appName: ["touchup", "touchup", "touchup"],
   lineConnecting: ["connecting …", "verbinde …", "conectando …"],

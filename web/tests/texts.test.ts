@@ -5,7 +5,7 @@ import { LANGUAGES, texts } from "../src/texts";
 
 const SOURCES = new URL("../src/", import.meta.url);
 const sources = readdirSync(SOURCES)
-  .filter((name) => name.endsWith(".ts") && name !== "texts.ts")
+  .filter((name) => name.endsWith(".ts") && !name.startsWith("texts"))
   .map((name) => ({ name, text: readFileSync(new URL(name, SOURCES), "utf8") }));
 
 const placeholders = (text: string): string[] => [...text.matchAll(/\{(\w+)\}/g)].map((match) => match[1]).sort();

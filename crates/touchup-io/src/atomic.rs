@@ -123,7 +123,7 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known they stay.
-fn remove_left(folder: &Path, stem: &str) {
+pub(super) fn remove_left(folder: &Path, stem: &str) {
     let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else { return };
     if !processes.join("self").exists() {
         return;

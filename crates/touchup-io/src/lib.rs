@@ -53,6 +53,7 @@ pub mod probed_touches_file;
 pub mod qif_file;
 pub mod recording;
 mod scalar;
+pub mod scan_folder;
 pub mod session_folder;
 pub mod static_poses;
 pub mod table;

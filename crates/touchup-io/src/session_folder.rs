@@ -236,7 +236,7 @@ pub fn open_file(parent: &Path, session: &str, file: &str) -> io::Result<(File, 
 }
 
 /// Whether it is the name of one thing in a folder, and of none outside.
-fn is_plain_name(name: &str) -> bool {
+pub(super) fn is_plain_name(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
         && !name.starts_with('.')

@@ -50,7 +50,7 @@ struct Asked {
 
 /// Serves a page until it goes.
 pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
-    let page = site.pages_so_far.fetch_add(1, Ordering::Relaxed);
+    let page = site.entrance.pages_so_far.fetch_add(1, Ordering::Relaxed);
     site.board.join(page);
     let (to_page, mut from_page) = socket.split();
     let (answers, waiting) = channel(MOST_ANSWERS);

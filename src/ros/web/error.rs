@@ -25,6 +25,9 @@ pub enum WebError {
         /// what is wrong with it
         why: String,
     },
+    /// nothing can be set up with these
+    #[error("{0}")]
+    Setup(String),
     /// a service has a name that is none
     #[error(transparent)]
     Ros(#[from] RosError),

@@ -2,11 +2,12 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::Router;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -19,6 +20,7 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 
 use super::error::WebError;
+use crate::ros::locked;
 
 /// Connections at a time at most.
 const MOST_CONNECTIONS: usize = 64;
@@ -52,8 +54,28 @@ impl Certificate {
     }
 }
 
+/// What is served, which changes while connections are open.
+#[derive(Clone, Debug)]
+pub(super) struct Routes(Arc<Mutex<Router>>);
+
+impl Routes {
+    /// At first.
+    pub fn new(router: Router) -> Self {
+        Self(Arc::new(Mutex::new(router)))
+    }
+
+    /// From now on.
+    pub fn set(&self, router: Router) {
+        *locked(&self.0) = router;
+    }
+
+    fn now(&self) -> Router {
+        locked(&self.0).clone()
+    }
+}
+
 /// Serves until it is dropped.
-pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, router: Router) {
+pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, routes: Routes) {
     let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     loop {
         let Ok(place) = Arc::clone(&room).acquire_owned().await else { return };
@@ -65,27 +87,29 @@ pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, route
                 continue;
             }
         };
-        let (tls, router) = (tls.clone(), router.clone());
+        let (tls, routes) = (tls.clone(), routes.clone());
         tokio::spawn(async move {
             // a client that goes away is no matter of ours
-            let _ = connect(stream, tls, router).await;
+            let _ = connect(stream, tls, routes).await;
             drop(place);
         });
     }
 }
 
-async fn connect(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) -> io::Result<()> {
+async fn connect(stream: TcpStream, tls: Option<TlsAcceptor>, routes: Routes) -> io::Result<()> {
     // a change of the mesh does not wait for the next
     stream.set_nodelay(true)?;
     match tls {
-        None => answer(stream, router).await,
-        Some(tls) => answer(timeout(HEAD_WITHIN, tls.accept(stream)).await??, router).await,
+        None => answer(stream, routes).await,
+        Some(tls) => answer(timeout(HEAD_WITHIN, tls.accept(stream)).await??, routes).await,
     }
 }
 
-async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) -> io::Result<()> {
+async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, routes: Routes) -> io::Result<()> {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEAD_WITHIN).max_buf_size(64 << 10);
-    let connection = http.serve_connection(TokioIo::new(stream), TowerToHyperService::new(router));
+    // a connection that stays open is answered by what is served when it asks
+    let service = service_fn(move |request| TowerToHyperService::new(routes.now()).call(request));
+    let connection = http.serve_connection(TokioIo::new(stream), service);
     connection.with_upgrades().await.map_err(io::Error::other)
 }

@@ -6,12 +6,12 @@
 
 mod access;
 mod annotations;
-mod answers;
 mod background;
 mod board;
 mod calls;
 mod connection;
 mod downloads;
+mod entrance;
 mod error;
 mod http;
 mod knowledge;
@@ -22,6 +22,7 @@ mod page;
 mod report_request;
 mod report_work;
 mod reports;
+mod setup;
 mod site;
 mod vertex_numbers;
 
@@ -32,7 +33,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::thread::{Builder, JoinHandle};
 
+use axum::middleware::from_fn_with_state;
 use tokio::net::TcpListener;
+use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
 pub use self::access::Role;
@@ -40,10 +43,13 @@ use self::access::{Access, in_a_link};
 use self::annotations::Annotations;
 use self::board::Board;
 use self::calls::Calls;
+use self::entrance::Entrance;
 pub use self::error::WebError;
 pub use self::listener::Certificate;
+use self::listener::Routes;
 use self::nominal::Nominal;
 use self::report_work::Reports;
+pub use self::setup::{NodeSetup, SetupParams, SetupStep};
 use self::site::{ScanShown, Site};
 use super::inbox::Inbox;
 use super::messages::MeshPatch;
@@ -84,20 +90,103 @@ pub struct NodeFacts {
 /// Serves until it is dropped.
 pub struct WebServer {
     invitations: Vec<String>,
-    site: Arc<Site>,
+    entrance: Arc<Entrance>,
+    routes: Routes,
+    runtime: Handle,
     stop: Arc<Notify>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl WebServer {
-    /// Address of the page.
-    pub fn url(&self) -> &str {
-        &self.site.base
+    /// Serves the files of the page and nothing else yet.
+    ///
+    /// - `notify`: tells the operator beside the machine of the next link, when one was used.
+    ///
+    /// # Errors
+    /// [`WebError`]
+    pub fn open(params: &WebParams, notify: fn(&str)) -> Result<Self, WebError> {
+        let tls = params.certificate.as_ref().map(Certificate::acceptor).transpose()?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+        let listener = runtime.block_on(TcpListener::bind(params.address));
+        let listener = listener.map_err(|source| WebError::Address { address: params.address, source })?;
+        let address = listener.local_addr()?;
+        let names: Vec<String> = params.names.iter().cloned().chain(own_address(address)).collect();
+        let access = Access::new(address, &names, params.by_link, tls.is_some());
+        let name = names.first().cloned().unwrap_or_else(|| in_a_link(address.ip()));
+        let base = format!("{}://{name}:{}", access.scheme(), address.port());
+        let entrance = Arc::new(Entrance { access, base, notify, pages_so_far: AtomicU64::new(0) });
+        let roles = [Role::Operate, Role::Look];
+        let invitations = match entrance.access.needs_cookie() {
+            true => roles.map(|role| entrance.invitation(role)).into_iter().collect::<io::Result<_>>()?,
+            false => Vec::new(),
+        };
+        let checked = from_fn_with_state(Arc::clone(&entrance), entrance::check);
+        let routes = Routes::new(entrance::routes(&entrance).fallback(entrance::nothing).layer(checked));
+        let (stop, handle) = (Arc::new(Notify::new()), runtime.handle().clone());
+        let (stopped, served) = (Arc::clone(&stop), routes.clone());
+        let serve = move || {
+            runtime.block_on(async {
+                tokio::select! {
+                    () = listener::serve(listener, tls, served) => {}
+                    () = stopped.notified() => {}
+                }
+            });
+            runtime.shutdown_background();
+        };
+        let thread = Some(Builder::new().name("touchup-web".to_owned()).spawn(serve)?);
+        Ok(Self { invitations, entrance, routes, runtime: handle, stop, thread })
     }
 
-    /// Whether a page was ever opened.
+    /// Serves what a node is made ready with, until one is.
+    ///
+    /// # Errors
+    /// [`WebError::Setup`]
+    pub fn set_up(&self, params: SetupParams) -> Result<Arc<NodeSetup>, WebError> {
+        let setup = Arc::new(NodeSetup::new(params)?);
+        self.routes.set(setup::router(&self.entrance, &setup));
+        Ok(setup)
+    }
+
+    /// Serves a node: the port for it, which sends to `network` and to the page.
+    ///
+    /// - `whole`: the mesh as the node has it at its start.
+    ///
+    /// # Errors
+    /// [`WebError`]
+    pub fn serve_node(
+        &self,
+        facts: NodeFacts,
+        inbox: Inbox,
+        whole: impl Iterator<Item = MeshPatch>,
+        network: Arc<dyn Port>,
+    ) -> Result<Arc<dyn Port>, WebError> {
+        let file = facts.scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let site = Arc::new(Site {
+            board: Board::new(whole),
+            calls: Calls::new(&inbox)?,
+            inbox,
+            entrance: Arc::clone(&self.entrance),
+            annotations: Annotations::new(&facts.session_folder),
+            nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
+            reports: Reports::new(facts.nominal_file, facts.mesh_unit),
+            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
+            scan_mesh: facts.scan_mesh,
+            session_folder: facts.session_folder,
+            pages: AtomicUsize::new(0),
+        });
+        self.routes.set(http::router(Arc::clone(&site)));
+        self.runtime.spawn(knowledge::follow(Arc::clone(&site)));
+        Ok(Arc::new(PagePort { network, site }))
+    }
+
+    /// Address of the page.
+    pub fn url(&self) -> &str {
+        &self.entrance.base
+    }
+
+    /// Whether a page was ever opened on a node.
     pub fn was_opened(&self) -> bool {
-        self.site.pages_so_far.load(Ordering::Relaxed) > 0
+        self.entrance.pages_so_far.load(Ordering::Relaxed) > 0
     }
 
     /// Links by which pages are let in, each with what it gives; none where everybody is.
@@ -114,68 +203,6 @@ impl Drop for WebServer {
             let _ = thread.join();
         }
     }
-}
-
-/// Serves the page: the port for the node, which sends to `network` and to the page.
-///
-/// - `whole`: the mesh as the node has it at its start.
-/// - `notify`: tells the operator beside the machine of the next link, when one was used.
-///
-/// # Errors
-/// [`WebError`]
-pub fn start(
-    params: &WebParams,
-    facts: NodeFacts,
-    inbox: Inbox,
-    whole: impl Iterator<Item = MeshPatch>,
-    network: Arc<dyn Port>,
-    notify: fn(&str),
-) -> Result<(Arc<dyn Port>, WebServer), WebError> {
-    let tls = params.certificate.as_ref().map(Certificate::acceptor).transpose()?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
-    let listener = runtime.block_on(TcpListener::bind(params.address));
-    let listener = listener.map_err(|source| WebError::Address { address: params.address, source })?;
-    let address = listener.local_addr()?;
-    let names: Vec<String> = params.names.iter().cloned().chain(own_address(address)).collect();
-    let access = Access::new(address, &names, params.by_link, tls.is_some());
-    let name = names.first().cloned().unwrap_or_else(|| in_a_link(address.ip()));
-    let base = format!("{}://{name}:{}", access.scheme(), address.port());
-    let file = facts.scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let site = Arc::new(Site {
-        board: Board::new(whole),
-        calls: Calls::new(&inbox)?,
-        inbox,
-        access,
-        annotations: Annotations::new(&facts.session_folder),
-        nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
-        reports: Reports::new(facts.nominal_file, facts.mesh_unit),
-        scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
-        scan_mesh: facts.scan_mesh,
-        session_folder: facts.session_folder,
-        pages: AtomicUsize::new(0),
-        pages_so_far: AtomicU64::new(0),
-        base,
-        notify,
-    });
-    let invitations = match site.access.needs_cookie() {
-        true => [Role::Operate, Role::Look].map(|role| site.invitation(role)).into_iter().collect::<io::Result<_>>()?,
-        false => Vec::new(),
-    };
-    let (stop, router) = (Arc::new(Notify::new()), http::router(Arc::clone(&site)));
-    let (stopped, followed) = (Arc::clone(&stop), Arc::clone(&site));
-    let serve = move || {
-        runtime.block_on(async {
-            tokio::select! {
-                () = listener::serve(listener, tls, router) => {}
-                () = knowledge::follow(followed) => {}
-                () = stopped.notified() => {}
-            }
-        });
-        runtime.shutdown_background();
-    };
-    let thread = Some(Builder::new().name("touchup-web".to_owned()).spawn(serve)?);
-    let port = Arc::new(PagePort { network, site: Arc::clone(&site) });
-    Ok((port, WebServer { invitations, site, stop, thread }))
 }
 
 /// The address by which others reach a machine that listens to all of its own, as far as it is known: nothing is sent.

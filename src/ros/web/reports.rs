@@ -15,10 +15,10 @@ use tokio::sync::oneshot;
 use tokio::time::timeout;
 
 use super::access::Role;
-use super::answers::{as_json, refusal, role_of};
 use super::background::begin;
 use super::calls::MAY_ONLY_LOOK;
 use super::downloads::body_of;
+use super::entrance::{as_json, refusal};
 use super::report_request::{NominalSource, ReportRequest};
 use super::report_work::{NominalFile, ReportWork};
 use super::site::Site;
@@ -58,7 +58,7 @@ pub(super) async fn make(
     query: Result<Query<ReportRequest>, axum::extract::rejection::QueryRejection>,
     request: Request,
 ) -> Response {
-    match role_of(&site, &headers) {
+    match site.entrance.role_of(&headers) {
         Ok(Role::Operate) => {}
         Ok(Role::Look) => return refusal(StatusCode::FORBIDDEN, MAY_ONLY_LOOK),
         Err(response) => return *response,
@@ -170,7 +170,7 @@ async fn save(site: &Site) -> Result<(), Refused> {
 
 /// Shows a report: `GET /api/reports/SESSION`.
 pub(super) async fn show(State(site): State<Arc<Site>>, headers: HeaderMap, Path(session): Path<String>) -> Response {
-    if let Err(response) = role_of(&site, &headers) {
+    if let Err(response) = site.entrance.role_of(&headers) {
         return *response;
     }
     let folder = site.session_folder.clone();

@@ -1,19 +1,17 @@
 //! What all pages share: what they are shown, who may ask what, and what the page answers by itself.
 
-use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use qrcode::QrCode;
-use qrcode::render::unicode::Dense1x2;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::access::{Access, Role};
+use super::access::Role;
 use super::annotations::{AnnotateRequest, Annotations};
 use super::board::Board;
 use super::calls::{Answer, Calls, MAY_ONLY_LOOK};
+use super::entrance::Entrance;
 use super::nominal::Nominal;
 use super::report_work::Reports;
 use crate::mesh::{FaceTree, TriMesh};
@@ -25,7 +23,7 @@ pub(super) struct Site {
     pub board: Board,
     pub calls: Calls,
     pub inbox: Inbox,
-    pub access: Access,
+    pub entrance: Arc<Entrance>,
     pub annotations: Annotations,
     pub nominal: Option<Arc<Nominal>>,
     pub reports: Reports,
@@ -35,12 +33,6 @@ pub(super) struct Site {
     pub session_folder: PathBuf,
     /// pages that are open
     pub pages: AtomicUsize,
-    /// … and that were ever opened
-    pub pages_so_far: AtomicU64,
-    /// address of the page: for links
-    pub base: String,
-    /// tells the operator beside the machine
-    pub notify: fn(&str),
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -117,47 +109,10 @@ impl Site {
             role: Role,
         }
         let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        let link = match self.access.needs_cookie() {
-            true => self.link(self.access.invite(role).map_err(|error| error.to_string())?.text()),
-            false => self.base.clone(),
-        };
-        Ok(json!({ "link": link, "code": code_rows(&link) }))
-    }
-
-    fn link(&self, token: &str) -> String {
-        format!("{}/pair?token={token}", self.base)
-    }
-
-    /// Somebody came in by a link, which is used up: here is the next.
-    pub fn note_paired(&self, role: Role) {
-        match self.invitation(role) {
-            Ok(text) => (self.notify)(&format!("a page was let in to {}; {text}", in_words(role))),
-            Err(error) => tracing::warn!(%error, "there is no new link"),
-        }
-    }
-
-    /// A new link in words, and as a QR code.
-    pub fn invitation(&self, role: Role) -> io::Result<String> {
-        let link = self.link(self.access.invite(role)?.text());
-        let code = QrCode::new(&link).map(|code| code.render::<Dense1x2>().build()).unwrap_or_default();
-        let code = if role == Role::Operate { format!("\n{code}") } else { String::new() };
-        Ok(format!("the next one may {} by {link}{code}", in_words(role)))
+        let (link, code) = self.entrance.invite(role).map_err(|error| error.to_string())?;
+        Ok(json!({ "link": link, "code": code }))
     }
 }
 
 /// What the page itself is asked, and not the node.
 type OwnCall = fn(&Site, Value) -> Result<Value, String>;
-
-/// A QR code, row by row: 1 where it is dark.
-fn code_rows(text: &str) -> Vec<String> {
-    let Ok(code) = QrCode::new(text) else { return Vec::new() };
-    let modules: Vec<char> = code.to_colors().into_iter().map(|colour| colour.select('1', '0')).collect();
-    modules.chunks(code.width()).map(String::from_iter).collect()
-}
-
-fn in_words(role: Role) -> &'static str {
-    match role {
-        Role::Look => "look",
-        Role::Operate => "operate",
-    }
-}

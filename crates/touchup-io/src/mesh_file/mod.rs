@@ -29,6 +29,9 @@ use touchup_core::mesh::{
 };
 pub use unit::{Implausible, LARGEST_M, MeshUnit, SMALLEST_M};
 
+/// Extensions of the files that hold a scan, in lower case: meshes, then point clouds.
+pub const SCAN_EXTENSIONS: &[&str] = &["ply", "stl", "obj", "pcd", "xyz", "txt", "asc", "e57"];
+
 /// Why a mesh file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFileError {

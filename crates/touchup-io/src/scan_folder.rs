@@ -1,0 +1,307 @@
+//! A folder from which somebody else chooses scans and recordings, and to which scans are added: nothing outside of it is listed, read or
+//! written, and nothing in it is written over.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde::Serialize;
+use tempfile::TempPath;
+
+use super::atomic::remove_left;
+use super::mesh_file::SCAN_EXTENSIONS;
+use super::session_folder::is_plain_name;
+
+/// Recordings that are one file, by extension.
+const RECORDING_EXTENSIONS: &[&str] = &["mcap", "db3"];
+/// Files in a list at most: the newest.
+const MOST_LISTED: usize = 500;
+/// Bytes of a name at most, as file systems have it, with room for a number.
+const LONGEST_NAME: usize = 200;
+/// Files of one name at most.
+const MOST_OF_A_NAME: u32 = 1000;
+/// How the temporary name of an upload begins.
+const UPLOAD_STEM: &str = ".upload.";
+
+/// What a file is taken for, by its extension.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FolderFileKind {
+    /// a mesh or a point cloud
+    Scan,
+    /// a ROS 2 recording in one file
+    Recording,
+}
+
+impl FolderFileKind {
+    fn of_name(name: &str) -> Option<Self> {
+        let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
+        let is_of = |known: &[&str]| known.contains(&extension.as_str());
+        match () {
+            () if is_of(SCAN_EXTENSIONS) => Some(Self::Scan),
+            () if is_of(RECORDING_EXTENSIONS) => Some(Self::Recording),
+            () => None,
+        }
+    }
+}
+
+/// A file that can be chosen.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FolderFile {
+    /// without a folder
+    pub name: String,
+    /// its length
+    pub bytes: u64,
+    /// when it was changed, s since 1970 UTC; `None` where the system does not say
+    pub modified_s: Option<u64>,
+}
+
+/// Why a file is not taken.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanFolderError {
+    /// It could lead out of the folder, or is none.
+    #[error("\"{0}\" is not a plain name of a file: give one without folders, such as scan.ply")]
+    NotAPlainName(String),
+    /// Its extension says that it is something else.
+    #[error("\"{0}\" is no scan by its name: it must end in one of {known}", known = SCAN_EXTENSIONS.join(", "))]
+    NotAScan(String),
+    /// There is none of that name, or it is a link or a folder.
+    #[error("there is no file \"{0}\" in the folder of scans: look at the list again")]
+    NotThere(String),
+    /// More came than is taken.
+    #[error("the file is larger than {0} bytes: make the scan coarser, or copy it into the folder of scans")]
+    TooLarge(u64),
+    /// What the system says.
+    #[error("the folder of scans cannot be used: {0}")]
+    System(#[from] io::Error),
+}
+
+/// The folder.
+#[derive(Clone, Debug)]
+pub struct ScanFolder {
+    path: PathBuf,
+}
+
+impl ScanFolder {
+    /// - `path`: of a folder that is there.
+    ///
+    /// # Errors
+    /// Whatever the system reports, and a path to something else.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let path = fs::canonicalize(path)?;
+        match path.is_dir() {
+            true => Ok(Self { path }),
+            false => Err(io::Error::new(io::ErrorKind::NotADirectory, "it is no folder")),
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The plain files of a kind that lie in it, the newest first; links are left out.
+    ///
+    /// # Errors
+    /// Whatever the system reports of the folder.
+    pub fn list(&self, kind: FolderFileKind) -> io::Result<Vec<FolderFile>> {
+        let mut found = Vec::new();
+        for entry in fs::read_dir(&self.path)? {
+            // a file that goes meanwhile is not there
+            let Ok((name, about)) = entry.and_then(|entry| Ok((entry.file_name(), entry.metadata()?))) else {
+                continue;
+            };
+            let Ok(name) = name.into_string() else { continue };
+            if about.is_file() && is_plain_name(&name) && FolderFileKind::of_name(&name) == Some(kind) {
+                let since = |time: SystemTime| time.duration_since(UNIX_EPOCH).ok();
+                let modified_s = about.modified().ok().and_then(since).map(|since| since.as_secs());
+                found.push(FolderFile { name, bytes: about.len(), modified_s });
+            }
+        }
+        found.sort_by(|a, b| b.modified_s.cmp(&a.modified_s).then_with(|| a.name.cmp(&b.name)));
+        found.truncate(MOST_LISTED);
+        Ok(found)
+    }
+
+    /// The place of a file that somebody chose.
+    ///
+    /// # Errors
+    /// [`ScanFolderError`] for whatever is no plain file of that kind in the folder.
+    pub fn file(&self, name: &str, kind: FolderFileKind) -> Result<PathBuf, ScanFolderError> {
+        if !is_plain_name(name) {
+            return Err(ScanFolderError::NotAPlainName(name.to_owned()));
+        }
+        let path = self.path.join(name);
+        // a link may lead anywhere
+        let is_there = fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+        match is_there && FolderFileKind::of_name(name) == Some(kind) {
+            true => Ok(path),
+            false => Err(ScanFolderError::NotThere(name.to_owned())),
+        }
+    }
+
+    /// The place of a plain file of that name, where there is one.
+    pub fn plain_file(&self, name: &str) -> Option<PathBuf> {
+        let path = self.path.join(name);
+        let is_there = is_plain_name(name) && fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+        is_there.then_some(path)
+    }
+
+    /// A place where nothing is: that of `stem.extension`, or with a number.
+    pub fn free_place(&self, stem: &str, extension: &str) -> PathBuf {
+        let named = |number| match number {
+            1 => self.path.join(format!("{stem}.{extension}")),
+            _ => self.path.join(format!("{stem}-{number}.{extension}")),
+        };
+        let free = (1u32..).map(named).find(|path| fs::symlink_metadata(path).is_err());
+        free.unwrap_or_else(|| self.path.join(format!("{stem}.{extension}")))
+    }
+
+    /// Begins a new scan, which is there when it is whole.
+    ///
+    /// - `name`: as its owner calls it; what a file's name had better not have becomes `_`.
+    /// - `most`: bytes at most.
+    ///
+    /// # Errors
+    /// [`ScanFolderError`]
+    pub fn begin_upload(&self, name: &str, most: u64) -> Result<ScanUpload, ScanFolderError> {
+        let name = cleaned(name)?;
+        remove_left(&self.path, UPLOAD_STEM);
+        let prefix = format!("{UPLOAD_STEM}{}-", std::process::id());
+        let made = tempfile::Builder::new()
+            .prefix(&prefix)
+            .suffix(".part")
+            .make_in(&self.path, |path| File::create_new(path))?;
+        let (file, temporary) = made.into_parts();
+        Ok(ScanUpload { folder: self.path.clone(), name, file, temporary, bytes: 0, most })
+    }
+}
+
+/// A name as the folder has it.
+fn cleaned(name: &str) -> Result<String, ScanFolderError> {
+    if !is_plain_name(name) || name.len() > LONGEST_NAME {
+        return Err(ScanFolderError::NotAPlainName(name.chars().take(LONGEST_NAME).collect()));
+    }
+    if FolderFileKind::of_name(name) != Some(FolderFileKind::Scan) {
+        return Err(ScanFolderError::NotAScan(name.to_owned()));
+    }
+    let is_plain = |c: char| c.is_alphanumeric() || "-_.()+ ".contains(c);
+    Ok(name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect())
+}
+
+/// A scan on its way; dropped before it is whole, nothing is left of it.
+#[derive(Debug)]
+pub struct ScanUpload {
+    folder: PathBuf,
+    name: String,
+    file: File,
+    /// removes the file when it is dropped
+    temporary: TempPath,
+    bytes: u64,
+    most: u64,
+}
+
+impl ScanUpload {
+    /// Adds what came.
+    ///
+    /// # Errors
+    /// [`ScanFolderError::TooLarge`], [`ScanFolderError::System`].
+    pub fn add(&mut self, piece: &[u8]) -> Result<(), ScanFolderError> {
+        self.bytes += piece.len() as u64;
+        if self.bytes > self.most {
+            return Err(ScanFolderError::TooLarge(self.most));
+        }
+        Ok(self.file.write_all(piece)?)
+    }
+
+    /// Gives the file its name, or that with a number where it is taken: the name.
+    ///
+    /// # Errors
+    /// [`ScanFolderError::System`]; nothing is left then.
+    pub fn commit(self) -> Result<String, ScanFolderError> {
+        let Self { folder, name, file, mut temporary, .. } = self;
+        file.sync_all()?;
+        let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
+        for number in 1..=MOST_OF_A_NAME {
+            let free = if number == 1 { name.clone() } else { format!("{stem}-{number}.{extension}") };
+            match temporary.persist_noclobber(folder.join(&free)) {
+                Ok(()) => return Ok(free),
+                Err(taken) if taken.error.kind() == io::ErrorKind::AlreadyExists => temporary = taken.path,
+                Err(other) => return Err(other.error.into()),
+            }
+        }
+        Err(io::Error::from(io::ErrorKind::AlreadyExists).into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn uploaded(folder: &ScanFolder, name: &str, text: &str) -> Result<String, ScanFolderError> {
+        let mut upload = folder.begin_upload(name, 10)?;
+        upload.add(text.as_bytes())?;
+        upload.commit()
+    }
+
+    #[test]
+    fn an_upload_never_writes_over_a_file_and_is_there_whole_or_not_at_all() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = ScanFolder::open(place.path()).unwrap();
+        assert_eq!(uploaded(&folder, "part.ply", "one").unwrap(), "part.ply");
+        assert_eq!(uploaded(&folder, "part.ply", "two").unwrap(), "part-2.ply");
+        assert_eq!(uploaded(&folder, "part.ply", "three").unwrap(), "part-3.ply");
+        assert!(matches!(uploaded(&folder, "part.ply", "eleven char").unwrap_err(), ScanFolderError::TooLarge(10)));
+        let mut upload = folder.begin_upload("other.stl", 10).unwrap();
+        upload.add(b"half").unwrap();
+        drop(upload);
+        let mut names: Vec<_> = fs::read_dir(place.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["part-2.ply", "part-3.ply", "part.ply"]);
+        assert_eq!(fs::read_to_string(place.path().join("part.ply")).unwrap(), "one");
+    }
+
+    #[test]
+    fn names_that_lead_elsewhere_or_are_no_scan_are_refused_and_odd_ones_are_cleaned() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = ScanFolder::open(place.path()).unwrap();
+        for name in ["../part.ply", "/part.ply", "a/b.ply", "..", "", ".part.ply", "a\\b.ply", "a\nb.ply"] {
+            assert!(matches!(uploaded(&folder, name, "x").unwrap_err(), ScanFolderError::NotAPlainName(_)), "{name}");
+        }
+        for name in ["part", "part.exe", "scene.yaml", "touch.mcap"] {
+            assert!(matches!(uploaded(&folder, name, "x").unwrap_err(), ScanFolderError::NotAScan(_)), "{name}");
+        }
+        assert_eq!(uploaded(&folder, "Gehäuse 7 (neu)'$.STL", "x").unwrap(), "Gehäuse 7 (neu)__.STL");
+    }
+
+    #[test]
+    fn every_kind_of_file_that_is_listed_is_one_that_is_read() {
+        use crate::mesh_file::{MeshFileError, MeshUnit, read_mesh_or_points};
+        let place = tempfile::tempdir().unwrap();
+        let is_known = |extension: &str| {
+            let path = place.path().join(format!("part.{extension}"));
+            fs::write(&path, "nothing of it").unwrap();
+            !matches!(read_mesh_or_points(&path, MeshUnit::Metre), Err(MeshFileError::UnknownFormat { .. }))
+        };
+        assert!(SCAN_EXTENSIONS.iter().all(|extension| is_known(extension)));
+        assert!(!is_known("md") && !is_known("yaml"));
+    }
+
+    #[test]
+    fn only_plain_files_of_the_kind_are_listed_and_found() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = ScanFolder::open(place.path()).unwrap();
+        for name in ["part.ply", "touch.mcap", "notes.md"] {
+            fs::write(place.path().join(name), "x").unwrap();
+        }
+        fs::create_dir(place.path().join("folder.ply")).unwrap();
+        std::os::unix::fs::symlink("/etc/hostname", place.path().join("link.ply")).unwrap();
+        let names = |kind| folder.list(kind).unwrap().into_iter().map(|file| file.name).collect::<Vec<_>>();
+        assert_eq!(names(FolderFileKind::Scan), ["part.ply"]);
+        assert_eq!(names(FolderFileKind::Recording), ["touch.mcap"]);
+        assert!(folder.file("part.ply", FolderFileKind::Scan).is_ok());
+        for name in ["link.ply", "folder.ply", "touch.mcap", "none.ply", "../part.ply"] {
+            assert!(folder.file(name, FolderFileKind::Scan).is_err(), "{name}");
+        }
+    }
+}

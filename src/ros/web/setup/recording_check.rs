@@ -1,0 +1,46 @@
+//! What a recording of touches says of scan, tip and sensors, as `touchup doctor` prints it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::diagnose::InputFinding;
+use crate::input_check::{InputCheck, check_input};
+use crate::io::mesh_file::MeshUnit;
+use crate::io::recording::{StampSource, Topics};
+use crate::replay::Recording;
+use crate::scan::read_scan;
+use crate::scene::Scene;
+
+/// What was found.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct CheckFacts {
+    file: String,
+    /// the surest first; empty: nothing speaks against it
+    findings: Vec<InputFinding>,
+    /// what is missing in the recording
+    losses: Vec<String>,
+}
+
+/// Everything that is checked together.
+pub(super) struct CheckInputs<'a> {
+    pub scan: (&'a Path, MeshUnit),
+    pub recording: &'a Path,
+    pub scene: &'a Scene,
+    pub topics: &'a Topics,
+}
+
+/// Replays a recording on the scan.
+///
+/// - `file`: name of the recording.
+///
+/// # Errors
+/// In words: why it cannot be replayed.
+pub(super) fn check_recording(file: &str, inputs: &CheckInputs<'_>) -> Result<CheckFacts, String> {
+    let CheckInputs { scan: (scan, unit), recording, scene, topics } = inputs;
+    let mesh = read_scan(scan, *unit).map_err(|error| error.to_string())?.mesh;
+    let opened = Recording::open(recording, topics, StampSource::Header).map_err(|error| error.to_string())?;
+    let found = check_input(opened, &mesh, scene, None, &mut || {}).map_err(|error| error.to_string())?;
+    let InputCheck { findings, losses, .. } = found;
+    Ok(CheckFacts { file: file.to_owned(), findings, losses })
+}

@@ -1,0 +1,183 @@
+//! What the page's address answers while a node is being set up.
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::{Body, to_bytes};
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::http::header::{self, HeaderMap};
+use axum::middleware::from_fn_with_state;
+use axum::response::Response;
+use axum::routing::{get, post};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use tokio::task::spawn_blocking;
+
+use super::node_setup::{NodeSetup, NodeSetupError};
+use super::scene_draft::StatedTip;
+use super::upload;
+use crate::io::mesh_file::MeshUnit;
+use crate::ros::web::access::Role;
+use crate::ros::web::calls::MAY_ONLY_LOOK;
+use crate::ros::web::entrance::{self, Entrance, as_json, refusal};
+
+/// Bytes of a request that is no file.
+const LARGEST_REQUEST: usize = 16 << 10;
+
+/// What is served.
+#[derive(Clone)]
+struct Served {
+    entrance: Arc<Entrance>,
+    setup: Arc<NodeSetup>,
+}
+
+/// All that is answered.
+pub(in crate::ros::web) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetup>) -> Router {
+    let checked = from_fn_with_state(Arc::clone(entrance), entrance::check);
+    Router::new()
+        .route("/api/setup", get(shown))
+        .route("/api/setup/upload", post(take_upload))
+        .route("/api/setup/scan", post(choose_scan))
+        .route("/api/setup/unit", post(choose_unit))
+        .route("/api/setup/tip", post(state_tip))
+        .route("/api/setup/check", post(check))
+        .route("/api/setup/start", post(start))
+        .with_state(Served { entrance: Arc::clone(entrance), setup: Arc::clone(setup) })
+        .merge(entrance::routes(entrance))
+        .fallback(entrance::nothing)
+        .layer(checked)
+}
+
+type Answered = Result<Response, Box<Response>>;
+
+impl Served {
+    /// Refuses who may only look.
+    fn operator(&self, headers: &HeaderMap) -> Result<(), Box<Response>> {
+        match self.entrance.role_of(headers)? {
+            Role::Operate => Ok(()),
+            Role::Look => Err(Box::new(refusal(StatusCode::FORBIDDEN, MAY_ONLY_LOOK))),
+        }
+    }
+
+    /// The setup as it is now.
+    async fn answer(&self, role: Role) -> Answered {
+        let setup = Arc::clone(&self.setup);
+        let shown = spawn_blocking(move || setup.shown(role)).await.map_err(|error| error.to_string()).flatten();
+        shown.map(|shown| as_json(&shown)).map_err(|why| Box::new(refusal(StatusCode::SERVICE_UNAVAILABLE, &why)))
+    }
+
+    /// Does what an operator asks for, and answers how it is then.
+    async fn change<T: DeserializeOwned>(
+        &self,
+        headers: &HeaderMap,
+        body: Body,
+        change: impl FnOnce(&Arc<NodeSetup>, T) -> Result<(), NodeSetupError> + Send + 'static,
+    ) -> Answered
+    where
+        T: Send + 'static,
+    {
+        self.operator(headers)?;
+        let bad = |status, why: String| Box::new(refusal(status, &why));
+        let text = to_bytes(body, LARGEST_REQUEST).await;
+        let text = text.map_err(|error| bad(StatusCode::PAYLOAD_TOO_LARGE, error.to_string()))?;
+        let asked = serde_json::from_slice(&text).map_err(|error| bad(StatusCode::BAD_REQUEST, error.to_string()))?;
+        let setup = Arc::clone(&self.setup);
+        // a file may be looked at or written
+        let done = spawn_blocking(move || change(&setup, asked)).await;
+        let done = done.map_err(|error| bad(StatusCode::SERVICE_UNAVAILABLE, error.to_string()))?;
+        done.map_err(|error| match &error {
+            NodeSetupError::NotNow(_) => bad(StatusCode::CONFLICT, error.to_string()),
+            NodeSetupError::Refused(_) => bad(StatusCode::UNPROCESSABLE_ENTITY, error.to_string()),
+        })?;
+        self.answer(Role::Operate).await
+    }
+}
+
+fn sent(answered: Answered) -> Response {
+    answered.unwrap_or_else(|refused| *refused)
+}
+
+async fn shown(State(served): State<Served>, headers: HeaderMap) -> Response {
+    match served.entrance.role_of(&headers) {
+        Ok(role) => sent(served.answer(role).await),
+        Err(refused) => *refused,
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScanRequest {
+    file: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct UnitRequest {
+    unit: MeshUnit,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StartRequest {}
+
+async fn choose_scan(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, ScanRequest { file }| setup.choose_scan(&file);
+    sent(served.change(&headers, body, change).await)
+}
+
+async fn choose_unit(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, UnitRequest { unit }| setup.choose_unit(unit);
+    sent(served.change(&headers, body, change).await)
+}
+
+async fn state_tip(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, tip: StatedTip| setup.state_tip(tip);
+    sent(served.change(&headers, body, change).await)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CheckRequest {
+    /// a recording of the folder; `None`: go on
+    recording: Option<String>,
+}
+
+async fn check(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, CheckRequest { recording }| setup.check(recording.as_deref());
+    sent(served.change(&headers, body, change).await)
+}
+
+async fn start(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, StartRequest {}| setup.start();
+    sent(served.change(&headers, body, change).await)
+}
+
+#[derive(Deserialize)]
+struct UploadQuery {
+    #[serde(default)]
+    name: String,
+}
+
+/// A scan: the body is the file. It is chosen then.
+async fn take_upload(
+    State(served): State<Served>,
+    Query(UploadQuery { name }): Query<UploadQuery>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
+    if let Err(refused) = served.operator(&headers) {
+        return *refused;
+    }
+    let length = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+    let file = match upload::take(&served.setup, name, length, body).await {
+        Ok(file) => file,
+        Err((status, why)) => return refusal(status, &why),
+    };
+    let setup = Arc::clone(&served.setup);
+    match spawn_blocking(move || setup.choose_scan(&file)).await {
+        Ok(Ok(())) => sent(served.answer(Role::Operate).await),
+        Ok(Err(error)) => refusal(StatusCode::CONFLICT, &error.to_string()),
+        Err(error) => refusal(StatusCode::SERVICE_UNAVAILABLE, &error.to_string()),
+    }
+}

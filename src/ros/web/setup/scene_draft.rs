@@ -1,0 +1,148 @@
+//! The scene as it is being made: its text, into which the chosen scan, unit and tip are put; everything else in it stays as it was.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::io::mesh_file::MeshUnit;
+use crate::scene::{Scene, SceneError, Setting};
+
+/// How the page gives the uncertainty: expanded, k = 2, as everywhere on it.
+const COVERAGE_FACTOR: f64 = 2.0;
+/// Goes behind the first key that is set.
+const REMARK: &str = "set on the operator's page";
+
+/// The tip as an operator states it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StatedTip {
+    /// of the ball
+    pub radius_mm: f64,
+    /// its expanded uncertainty, k = 2; `None`: as the scene has it
+    #[serde(default)]
+    pub uncertainty_mm: Option<f64>,
+}
+
+/// Which calibrations a scene has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub(super) struct NamedCalibrations {
+    /// where the scan lies in the frame of the poses
+    scan: bool,
+    /// the centre of the ball in the tracked stylus
+    tip: bool,
+    /// weight and bias on the force sensor
+    payload: bool,
+}
+
+/// A scene with its text.
+#[derive(Clone, Debug)]
+pub(super) struct SceneDraft {
+    text: String,
+    /// what the text says
+    pub scene: Scene,
+}
+
+impl SceneDraft {
+    /// - `path`: of the scene to begin with; `None`: the usual one, with every key explained.
+    ///
+    /// # Errors
+    /// [`SceneError`]
+    pub fn read(path: Option<&Path>) -> Result<Self, SceneError> {
+        let text = match path {
+            Some(path) => Scene::read_with_text(path)?.1,
+            None => Scene::template_without_radius(),
+        };
+        // without the files that it names: they are no part of the text
+        Ok(Self { scene: Scene::from_yaml(&text)?, text })
+    }
+
+    /// Whether files lie beside the scene that it names, besides the scan.
+    pub fn names_files(&self) -> bool {
+        let robot = self.scene.robot.as_ref();
+        let files = robot.map(|robot| [&robot.urdf, &robot.check]);
+        files.into_iter().flatten().flatten().any(|file| file.is_relative())
+    }
+
+    /// Which calibrations are in it (`touchup calibrate`).
+    pub fn calibrations(&self) -> NamedCalibrations {
+        let Scene { scan_to_space, tip, compensation, .. } = &self.scene;
+        NamedCalibrations {
+            scan: scan_to_space.is_some(),
+            tip: tip.as_ref().is_some_and(|tip| tip.offset.is_some()),
+            payload: compensation.as_ref().is_some_and(|one| one.payload.is_some() || one.bias.is_some()),
+        }
+    }
+
+    /// The radius that it says, mm.
+    pub fn radius_mm(&self) -> Option<f64> {
+        let is_said = Scene::names(&self.text, "tip", "radius_mm");
+        self.scene.tip.as_ref().filter(|_| is_said).map(|tip| tip.ball.radius * 1e3)
+    }
+
+    /// The unit that it says of a scan in its folder; `None` where it names another one.
+    pub fn unit_of(&self, file: &str) -> Option<MeshUnit> {
+        let scan = self.scene.scan.as_ref()?;
+        (scan.file.as_deref() == Some(Path::new(file))).then_some(scan.unit)
+    }
+
+    /// The text with the tip in it.
+    ///
+    /// - `scan`: name of a file in the folder of the scene, and its unit; `None`: as it is.
+    ///
+    /// # Errors
+    /// [`SceneError`]: a number out of its range, or a text in which it cannot be set.
+    pub fn with(&self, tip: Option<StatedTip>, scan: Option<(&str, MeshUnit)>) -> Result<String, SceneError> {
+        let (mut settings, mut expected) = (Vec::new(), self.scene.clone());
+        if let Some(StatedTip { radius_mm, uncertainty_mm }) = tip {
+            expected.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
+            settings.push(Setting::scalar("tip.radius_mm", radius_mm));
+            if let Some(u_mm) = uncertainty_mm {
+                let sigma_mm = u_mm / COVERAGE_FACTOR;
+                expected.uncertainty.get_or_insert_default().calibration.radius = sigma_mm / 1e3;
+                settings.push(Setting::scalar("uncertainty.radius_sigma_mm", sigma_mm));
+            }
+        }
+        if let Some((file, unit)) = scan {
+            let part = expected.scan.get_or_insert_default();
+            (part.file, part.unit) = (Some(file.into()), unit);
+            settings.push(Setting::scalar("scan.file", format!("'{}'", file.replace('\'', "''"))));
+            settings.push(Setting::scalar("scan.unit", unit));
+        }
+        expected.validate()?;
+        Scene::edited(&self.text, &settings, REMARK, &expected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_stated_is_in_the_text_and_the_rest_stays_with_its_comments() {
+        let text = "# bench 3\ntip: { radius_mm: 2 }\npatch: off  # no time\nuncertainty: off\n";
+        let draft = SceneDraft { text: text.to_owned(), scene: Scene::from_yaml(text).unwrap() };
+        assert_eq!(draft.radius_mm(), Some(2.0));
+        let tip = StatedTip { radius_mm: 1.5, uncertainty_mm: None };
+        let made = draft.with(Some(tip), Some(("it's.ply", MeshUnit::Inch))).unwrap();
+        let scene = Scene::from_yaml(&made).unwrap();
+        assert_eq!(scene.tip.unwrap().ball.radius, 1.5e-3);
+        let part = scene.scan.unwrap();
+        assert_eq!((part.file.unwrap().to_str(), part.unit), (Some("it's.ply"), MeshUnit::Inch));
+        assert!(made.starts_with("# bench 3\n") && made.contains("patch: off  # no time"), "{made}");
+    }
+
+    #[test]
+    fn the_usual_scene_says_no_radius_and_takes_one_with_its_uncertainty() {
+        let draft = SceneDraft::read(None).unwrap();
+        assert_eq!(draft.radius_mm(), None);
+        assert!(!draft.names_files());
+        let made = draft.with(Some(StatedTip { radius_mm: 1.5, uncertainty_mm: Some(0.004) }), None).unwrap();
+        let scene = Scene::from_yaml(&made).unwrap();
+        // the half of an expanded uncertainty with k = 2
+        assert!((scene.uncertainty.unwrap().calibration.radius - 2e-6).abs() < 1e-15);
+        assert!(Scene::names(&made, "tip", "radius_mm"));
+        for radius_mm in [0.0, -1.0, 1e6, f64::NAN] {
+            assert!(draft.with(Some(StatedTip { radius_mm, uncertainty_mm: None }), None).is_err(), "{radius_mm}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! A scan that a page sends: piece by piece into the folder of scans.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::http::StatusCode;
+use futures_util::StreamExt;
+use tokio::task::spawn_blocking;
+use tokio::time::timeout;
+
+use super::node_setup::{LARGEST_UPLOAD, NodeSetup, NodeSetupError, UploadPlace};
+use crate::io::scan_folder::{ScanFolderError, ScanUpload};
+
+/// Bytes that are written at a time.
+const PIECE: usize = 1 << 20;
+/// Bytes of a refused file that are let pass.
+const LARGEST_UNHEARD: usize = 64 << 20;
+/// An upload of which nothing comes for so long has ended.
+const STALLED: Duration = Duration::from_secs(30);
+
+/// Why a file was not taken.
+pub(super) type UploadRefusal = (StatusCode, String);
+
+/// Takes a scan: the name that it has in the folder.
+///
+/// - `length`: bytes that are to come, as far as it was said.
+///
+/// # Errors
+/// The status and why, in words; nothing is left of the file then.
+pub(super) async fn take(
+    setup: &Arc<NodeSetup>,
+    name: String,
+    length: Option<u64>,
+    body: Body,
+) -> Result<String, UploadRefusal> {
+    if length.is_some_and(|length| length > LARGEST_UPLOAD) {
+        return Err(refusal(ScanFolderError::TooLarge(LARGEST_UPLOAD)));
+    }
+    let mut pieces = body.into_data_stream();
+    let (place, mut upload) = match begin(setup, name, length).await {
+        Ok(begun) => begun,
+        Err(refused) => {
+            // a browser that still sends hears no answer
+            let mut left = LARGEST_UNHEARD;
+            while let Ok(Some(Ok(piece))) = timeout(STALLED, pieces.next()).await {
+                let Some(less) = left.checked_sub(piece.len()) else { break };
+                left = less;
+            }
+            return Err(refused);
+        }
+    };
+    let (mut waiting, mut count) = (Vec::with_capacity(PIECE), 0);
+    loop {
+        let next = timeout(STALLED, pieces.next()).await;
+        let next =
+            next.map_err(|_| (StatusCode::REQUEST_TIMEOUT, "nothing came any more: send it again".to_owned()))?;
+        let is_last = next.is_none();
+        if let Some(piece) = next {
+            waiting.extend_from_slice(&piece.map_err(|error| (StatusCode::BAD_REQUEST, error.to_string()))?);
+        }
+        if waiting.len() >= PIECE || is_last {
+            count += waiting.len() as u64;
+            (upload, waiting) = write(upload, waiting).await?;
+            place.note(count);
+        }
+        if is_last {
+            return on_disk(move || upload.commit()).await;
+        }
+    }
+}
+
+async fn begin(
+    setup: &Arc<NodeSetup>,
+    name: String,
+    length: Option<u64>,
+) -> Result<(UploadPlace, ScanUpload), UploadRefusal> {
+    let not_now = |error: NodeSetupError| (StatusCode::CONFLICT, error.to_string());
+    let place = setup.begin_upload(&name, length).map_err(not_now)?;
+    let folder = setup.folder.clone();
+    let upload = on_disk(move || folder.begin_upload(&name, LARGEST_UPLOAD)).await?;
+    Ok((place, upload))
+}
+
+async fn write(mut upload: ScanUpload, mut piece: Vec<u8>) -> Result<(ScanUpload, Vec<u8>), UploadRefusal> {
+    on_disk(move || {
+        upload.add(&piece)?;
+        piece.clear();
+        Ok((upload, piece))
+    })
+    .await
+}
+
+/// On a thread that may wait for the disk.
+async fn on_disk<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, ScanFolderError> + Send + 'static,
+) -> Result<T, UploadRefusal> {
+    match spawn_blocking(work).await {
+        Ok(done) => done.map_err(refusal),
+        Err(error) => Err((StatusCode::SERVICE_UNAVAILABLE, error.to_string())),
+    }
+}
+
+fn refusal(error: ScanFolderError) -> UploadRefusal {
+    let status = match error {
+        ScanFolderError::TooLarge(_) => StatusCode::PAYLOAD_TOO_LARGE,
+        ScanFolderError::System(_) => StatusCode::INSUFFICIENT_STORAGE,
+        _ => StatusCode::BAD_REQUEST,
+    };
+    (status, error.to_string())
+}
