@@ -15,6 +15,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde_json::{Value, json};
 
+use super::access::Role;
 use super::connection;
 use super::downloads::{body_of, sessions};
 use super::entrance::{self, as_json, refusal};
