@@ -2,7 +2,8 @@
 //! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
 //!
 //! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
-//! - `cargo bench --bench node --features web -- pages [FACES]`: the same beside pages: none, one that reads, and one that never reads, by turns.
+//! - `cargo bench --bench node --features web -- pages [FACES [TURNS]]`: the same beside pages: none, one that reads, and one that never
+//!   reads, by turns; at the end the middle p99 of each against that without a page.
 //! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process each, over DDS on the loopback
 //!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute. Into `FOLDER` go plots
 //!   and a table of each second.
@@ -131,10 +132,12 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
 
 /// The same beside pages, by turns, so that what else the machine does falls on all of them.
 #[cfg(feature = "web")]
-fn beside_pages(faces: usize) {
+fn beside_pages(faces: usize, turns: usize) {
     use touchup::ros::web::{NodeFacts, WebParams, WebServer};
-    for turn in 0..3 {
-        for kind in ["no page", "a page that reads", "a page that never reads"] {
+    let kinds = ["no page", "a page that reads", "a page that never reads"];
+    let mut p99 = kinds.map(|_| Vec::new());
+    for turn in 0..turns {
+        for (kind, p99) in kinds.into_iter().zip(&mut p99) {
             let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
             let (inbox, received) = inbox(INBOX, &Clock::system());
             let (port, world) = in_process::start(inbox.clone(), &Clock::system());
@@ -162,7 +165,19 @@ fn beside_pages(faces: usize) {
                 shown(report.latency_ns),
                 report.dropped
             );
+            p99.push(report.push_ns.p99);
         }
+    }
+    let middle = p99.map(|mut p99| {
+        p99.sort_unstable();
+        p99.get(p99.len() / 2).map_or(f64::NAN, |ns| *ns as f64)
+    });
+    for (kind, middle_ns) in kinds.into_iter().zip(middle) {
+        println!(
+            "{kind}: middle p99 of {turns} {:.0} us, {:.2} of that without a page",
+            middle_ns / 1e3,
+            middle_ns / middle[0]
+        );
     }
 }
 
@@ -300,7 +315,7 @@ fn main() {
         Some("viewer") => write(&peer::view(number(0, 0) as u16), path),
         Some("late") => peer::join_late(number(0, 0) as u16),
         #[cfg(feature = "web")]
-        Some("pages") => beside_pages(number(0, 1_000_000)),
+        Some("pages") => beside_pages(number(0, 1_000_000), number(1, 3)),
         _ if numbers.is_empty() => [100_000, 1_000_000].into_iter().for_each(alone),
         _ => numbers.into_iter().for_each(alone),
     }

@@ -1,6 +1,7 @@
 """The operator's page in a real browser: its picture against rays that are cast onto the saved mesh, live changes, lost connections,
 roles, holding a button for an arm to move, and what axe-core finds."""
 
+import io
 import json
 import re
 import time
@@ -8,8 +9,10 @@ import time
 import numpy
 import pytest
 import trimesh
+import zxingcpp
 from browser import DESKTOP, LANDSCAPE, PORTRAIT, first_hits, opened, picture, rays, rays_of, wait_until
 from conftest import ROOT
+from PIL import Image
 from ros_process import Process, play
 from running import DEADLINE_S
 from test_web import links
@@ -189,6 +192,20 @@ def test_who_only_looks_sees_the_same_and_changes_nothing(browser, touched):
     for page in (one, other):
         assert page.wrong == []
         page.context.close()
+
+
+def test_the_code_of_a_link_that_a_camera_reads_lets_its_role_in(browser, touched):
+    page = page_of(browser, touched)
+    page.get_by_role("button", name="Another device").click()
+    page.get_by_role("button", name="Link to look").click()
+    code = page.get_by_role("img", name="QR code of the link")
+    code.wait_for()
+    (read,) = zxingcpp.read_barcodes(Image.open(io.BytesIO(code.screenshot())))
+    assert read.format == zxingcpp.BarcodeFormat.QRCode and read.text == page.locator("output.link").inner_text()
+    other = opened(browser, read.text)
+    assert other.get_by_role("button", name="Undo").is_disabled() and other.wrong == []
+    other.context.close()
+    page.context.close()
 
 
 def test_changes_come_while_it_is_touched_and_a_page_that_was_away_catches_up(browser, touchup_bin, demo_folder, tmp_path):

@@ -119,8 +119,10 @@ def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_whi
         stands = max(moved) - let_go
         write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, seen by markers 33 ms apart.\n")
         assert -0.2 < stands < STANDS_WITHIN_S + FRAME_S, stands
-        assert page.call("~/recover")["response"]["success"]
-        _, done = order(page, hole, beats_s=120)
+        # and somewhere among the touches, from where it goes out by the way that it came
+        for beats_s in (25.0, 120.0):
+            assert page.call("~/recover")["response"]["success"]
+            _, done = order(page, hole, beats_s=beats_s)
         assert done["code"] in (1, 2) and abs(done["feature"]["diameter"] - 8e-3) < 50e-6, done
 
 

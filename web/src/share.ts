@@ -1,9 +1,17 @@
 /** Lets another device in: a link that is good for one device, to look or to operate. */
+import { codePicture } from "./code_picture";
 import { button, el } from "./dom";
 import type { Operating } from "./operating";
 
+interface Invitation {
+  link: string;
+  /** QR code of the link, row by row: 1 where it is dark. */
+  code: string[];
+}
+
 export class Share {
   readonly element: HTMLDialogElement;
+  private readonly code = el("div", { class: "code" });
   private readonly link = el("output", { class: "link", attributes: { tabindex: "0", hidden: "" } });
 
   constructor(private readonly operating: Operating) {
@@ -16,18 +24,21 @@ export class Share {
       el("div", { class: "row" }, el("h2", { id: "share-title", text: "share" }), close),
       el("p", { class: "muted", text: "shareHow" }),
       el("div", { class: "actions" }, operating.guard(look), operating.guard(operate)),
+      this.code,
       this.link,
     );
   }
 
   show(): void {
     this.link.hidden = true;
+    this.code.replaceChildren();
     this.element.showModal();
   }
 
   private async make(role: "look" | "operate"): Promise<void> {
     try {
-      const { link } = await this.operating.connection.call<{ link: string }>("~/invite", { role });
+      const { link, code } = await this.operating.connection.call<Invitation>("~/invite", { role });
+      this.code.replaceChildren(codePicture(code));
       this.link.hidden = false;
       this.link.textContent = link;
       // selected, so that one gesture copies it: a page without TLS has no clipboard

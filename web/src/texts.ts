@@ -130,6 +130,7 @@ export const texts = {
   // another device
   share: ["Another device", "Weiteres Gerät", "Otro dispositivo"],
   shareHow: ["A link lets one device in. Where the page is for this machine alone, it works only here.", "Ein Link lässt ein Gerät herein. Ist die Seite nur für diesen Rechner, gilt er nur hier.", "Un enlace deja entrar a un dispositivo. Si la página es solo para este equipo, vale solo aquí."],
+  codeOfLink: ["QR code of the link", "QR-Code des Links", "Código QR del enlace"],
   shareLook: ["Link to look", "Link zum Ansehen", "Enlace para mirar"],
   shareOperate: ["Link to operate", "Link zum Bedienen", "Enlace para operar"],
   // features

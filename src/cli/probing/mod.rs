@@ -71,7 +71,7 @@ impl Probing<'_> {
         let _planning = WorkProgress::stage("plan");
         let world = ready.static_world()?;
         let plan_of = |flag: &Flag| {
-            plan(&ready.cell, &ready.params, &world, flag, now).map_err(|error| CliError::plan(flag.id, error))
+            plan(&ready.cell, &ready.params, &world, flag, now, None).map_err(|error| CliError::plan(flag.id, error))
         };
         let plans = self.flags.iter().map(plan_of).collect::<Result<Vec<_>, _>>()?;
         draw_plan(&ready.mesh, &plans, self.flags, &self.out.join("plan.png"))?;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use qrcode::QrCode;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -96,7 +97,7 @@ impl Site {
         Ok(json!({ "success": true, "message": "noted" }))
     }
 
-    /// A link for another page: `{"role": "look"}`.
+    /// A link for another page, and its QR code: `{"role": "look"}`.
     fn invite(&self, request: Value) -> Result<Value, String> {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -105,13 +106,20 @@ impl Site {
         }
         let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
         let entrance = &self.entrance;
-        if !entrance.access.needs_cookie() {
-            return Ok(json!({ "link": entrance.base }));
-        }
-        let secret = entrance.access.invite(role).map_err(|error| error.to_string())?;
-        Ok(json!({ "link": entrance.link(secret.text()) }))
+        let link = match entrance.access.needs_cookie() {
+            true => entrance.link(entrance.access.invite(role).map_err(|error| error.to_string())?.text()),
+            false => entrance.base.clone(),
+        };
+        Ok(json!({ "link": link, "code": code_rows(&link) }))
     }
 }
 
 /// What the page itself is asked, and not the node.
 type OwnCall = fn(&Site, Value) -> Result<Value, String>;
+
+/// A QR code, row by row: 1 where it is dark.
+fn code_rows(text: &str) -> Vec<String> {
+    let Ok(code) = QrCode::new(text) else { return Vec::new() };
+    let modules: Vec<char> = code.to_colors().into_iter().map(|colour| colour.select('1', '0')).collect();
+    modules.chunks(code.width()).map(String::from_iter).collect()
+}

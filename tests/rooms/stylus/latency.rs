@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
 use touchup::stylus::{
-    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Sample, SyncParams,
+    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Message, Sample, SyncParams,
     Synchroniser, TipParams, Wrench,
 };
 
@@ -13,15 +13,21 @@ fn contacts() -> ContactEstimator {
         .unwrap()
 }
 
-fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
+fn touched(sensor: SensorParams, seed: u64) -> Vec<Message> {
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default()).unwrap();
-    let stylus = StylusParams { sensor, ..StylusParams::default() };
-    let touch = touch(&plate, &path, &stylus, seed).unwrap();
+    touch(&plate, &path, &StylusParams { sensor, ..StylusParams::default() }, seed).unwrap().messages
+}
+
+fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
+    estimated_from(touched(sensor, seed))
+}
+
+fn estimated_from(messages: impl IntoIterator<Item = Message>) -> Option<ClockOffset> {
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     let mut contacts = contacts();
-    let mut clock = ClockEstimator::new(Some(stylus.stiffness)).unwrap();
-    for message in touch.messages {
+    let mut clock = ClockEstimator::new(Some(StylusParams::default().stiffness)).unwrap();
+    for message in messages {
         sync.push(message);
         while let Some(sample) = sync.next_sample() {
             clock.push(contacts.observe(&sample).unwrap());
@@ -137,6 +143,23 @@ fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
         assert!((drift.offset_at_first * 1e3 - late_ms).abs() < 2.5, "{late_ms} ms: {drift:?}");
         let late_at_last = late_ms + LASTS_MS as f64 * ppm * 1e-6;
         assert!((drift.offset_at_last * 1e3 - late_at_last).abs() < 2.5, "{late_at_last} ms: {drift:?}");
+    }
+}
+
+/// Two short pieces far apart, as a full disk leaves them: a drift would show between them, and each alone says little.
+#[test]
+fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
+    for seed in 1..=2 {
+        let messages = touched(SensorParams::default(), seed);
+        let ends = [messages.first(), messages.last()].map(|message| message.unwrap().stamp_ns());
+        for from_s in 4..=11 {
+            for rest_s in [4, 6, 9, 14] {
+                let hole = ends[0] + from_s * 1_000_000_000..ends[1] - rest_s * 1_000_000_000;
+                let kept = messages.iter().filter(|message| !hole.contains(&message.stamp_ns())).cloned();
+                let drift = estimated_from(kept).and_then(|found| found.drift);
+                assert!(drift.is_none(), "seed {seed}, {from_s} s and {rest_s} s: {drift:?}");
+            }
+        }
     }
 }
 

@@ -47,12 +47,10 @@ const LEAST_SHARE: f64 = 0.7;
 const OTHER_DEPTH: f64 = 0.1;
 /// … when it is so many steps away.
 const OTHER_STEPS: usize = 10;
-/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so many; around the best so many steps on
-/// each side without one block.
+/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so many.
 const LARGEST_RATE: f64 = 400e-6;
 const RATE_STEP: f64 = 5e-6;
 const MOST_RATES: i64 = 400;
-const NEAR_RATES: usize = 6;
 /// A drift is sure when it is so many of its standard uncertainties, and worth taking off when it gains this much, s.
 const SURE_SIGMAS: f64 = 5.0;
 const LEAST_GAIN: f64 = 8e-3;
@@ -130,14 +128,14 @@ impl DelayBlocks {
         let parts = Parts::of(&self.blocks, of_block);
         let drift = parts.drift().filter(|drift| is_sure(drift, parts.span()));
         let rate = drift.map_or(0.0, |[rate, _]| rate);
-        let total = parts.total(rate, None);
+        let total = parts.total(rate);
         let offset = least(&total)?;
         let mean = total.iter().sum::<f64>() / DELAYS as f64;
-        let lowest = total.iter().copied().fold(f64::INFINITY, f64::min);
+        let lowest = lowest(&total);
         if lowest > LEAST_SHARE * mean || has_another(&total, lowest + OTHER_DEPTH * (mean - lowest)) {
             return None;
         }
-        let without = (0..parts.curves.len()).map(|at| least(&parts.total(rate, Some(at))));
+        let without = (0..parts.curves.len()).map(|at| least(&sum_of(&total, &parts.shifted(at, rate), -1.0)));
         let without: Vec<f64> = without.collect::<Option<_>>()?;
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
@@ -180,45 +178,58 @@ impl Parts {
         self.curves.first().zip(self.curves.last()).map_or(0.0, |(first, last)| last.0 - first.0)
     }
 
-    /// Their sum at each delay in the middle, where the delay grows by `rate`.
-    fn total(&self, rate: f64, left_out: Option<usize>) -> OfDelays {
-        let mut total = [0.0; DELAYS];
-        for (_, (time, curve)) in self.curves.iter().enumerate().filter(|(at, _)| Some(*at) != left_out) {
-            let shift = rate * (time - self.middle) / (STEP_NS as f64 * 1e-9);
-            let mean = curve.iter().sum::<f64>() / DELAYS as f64;
-            // beyond what was tried nothing is known
-            let value = |at: i64| usize::try_from(at).ok().and_then(|at| curve.get(at)).copied().unwrap_or(mean);
-            let (whole, share) = (shift.floor(), shift - shift.floor());
-            for (at, sum) in total.iter_mut().enumerate() {
-                let before = at as i64 + whole as i64;
-                *sum += value(before) * (1.0 - share) + value(before + 1) * share;
-            }
-        }
-        total
+    /// Sum of all at each delay in the middle, where the delay grows by `rate`.
+    fn total(&self, rate: f64) -> OfDelays {
+        let all = 0..self.curves.len();
+        all.fold([0.0; DELAYS], |total, at| sum_of(&total, &self.shifted(at, rate), 1.0))
     }
 
-    /// The rate at which the least of the sum is least, and its standard uncertainty; `None` at an end of what is tried.
+    /// A block's values at each delay in the middle, where the delay grows by `rate`.
+    fn shifted(&self, block: usize, rate: f64) -> OfDelays {
+        let (time, curve) = &self.curves[block];
+        let shift = rate * (time - self.middle) / (STEP_NS as f64 * 1e-9);
+        let mean = curve.iter().sum::<f64>() / DELAYS as f64;
+        // beyond what was tried nothing is known
+        let value = |at: i64| usize::try_from(at).ok().and_then(|at| curve.get(at)).copied().unwrap_or(mean);
+        let (whole, share) = (shift.floor(), shift - shift.floor());
+        std::array::from_fn(|at| {
+            let before = at as i64 + whole as i64;
+            value(before) * (1.0 - share) + value(before + 1) * share
+        })
+    }
+
+    /// The rate at which the least of the sum is least, and its standard uncertainty: by the jackknife over all rates, since without a
+    /// block it may be another one altogether. `None` at an end of what is tried.
     fn drift(&self) -> Option<[f64; 2]> {
         // one step of the rate is one of the delay from end to end
         let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);
         let count = ((LARGEST_RATE / rate_step) as i64).min(MOST_RATES);
         let rates: Vec<f64> = (-count..=count).map(|at| at as f64 * rate_step).collect();
-        let lowest = |rate: f64, left_out| self.total(rate, left_out).iter().copied().fold(f64::INFINITY, f64::min);
-        let best = |around: &[f64], left_out: Option<usize>| -> Option<(usize, f64)> {
-            let depths: Vec<f64> = around.iter().map(|rate| lowest(*rate, left_out)).collect();
+        let totals: Vec<OfDelays> = rates.iter().map(|rate| self.total(*rate)).collect();
+        let best = |depths: &[f64]| {
             let at = (0..depths.len()).min_by(|&a, &b| depths[a].total_cmp(&depths[b]))?;
             let (before, after) = (depths.get(at.checked_sub(1)?)?, depths.get(at + 1)?);
-            Some((at, around[at] + parabola([*before, depths[at], *after]) * (around[1] - around[0])))
+            Some(rates[at] + parabola([*before, depths[at], *after]) * rate_step)
         };
-        let (at, rate) = best(&rates, None)?;
-        let near = &rates[at.saturating_sub(NEAR_RATES)..(at + NEAR_RATES + 1).min(rates.len())];
-        // one block that moves the rate beyond what is near is a large part of its uncertainty
-        let of_one = |left_out: usize| best(near, Some(left_out)).map_or(near[0], |(_, rate)| rate);
-        let without: Vec<f64> = (0..self.curves.len()).map(of_one).collect();
+        let rate = best(&totals.iter().map(lowest).collect::<Vec<_>>())?;
+        let without = |left_out: usize| {
+            let less = |(rate, total): (&f64, &OfDelays)| lowest(&sum_of(total, &self.shifted(left_out, *rate), -1.0));
+            best(&rates.iter().zip(&totals).map(less).collect::<Vec<_>>())
+        };
+        let without: Vec<f64> = (0..self.curves.len()).map(without).collect::<Option<_>>()?;
         // what a step of the delays hides
         let of_steps = STEP_NS as f64 * 0.5e-9 / self.span().max(f64::MIN_POSITIVE);
         Some([rate, jackknife_variance(&without).sqrt().hypot(of_steps)])
     }
+}
+
+/// One sum and `weight` times another, at each delay.
+fn sum_of(one: &OfDelays, other: &OfDelays, weight: f64) -> OfDelays {
+    std::array::from_fn(|at| one[at] + weight * other[at])
+}
+
+fn lowest(sums: &OfDelays) -> f64 {
+    sums.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 impl Default for DelayBlocks {

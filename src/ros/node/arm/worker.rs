@@ -17,7 +17,7 @@ use super::world::{ArmLink, ArmWorld, GoalWatcher, ask_mesh, is_cancelled};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
 use crate::probing::arm::{Arm, StopRequest};
-use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, plan};
+use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, WayOut, plan};
 use crate::ros::messages::{
     Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResult, ProbeSettings,
     TriggerResponse,
@@ -113,6 +113,8 @@ struct ArmWorker {
     inputs: Receiver<FolderOrder>,
     /// the time of ROS when the last state came, ns
     ros_ns: i64,
+    /// of the feature that the last probing was stopped in
+    way_out: Option<WayOut>,
 }
 
 /// Starts the thread of an arm.
@@ -134,7 +136,8 @@ pub fn start(
     let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
     let ArmOfNode { kind, samples } = arm;
     let link = ArmLink { setup: Arc::clone(setup), samples, common, offset_ns: None, begun: setup.clock.now() };
-    let mut worker = ArmWorker { link, port: Arc::clone(port), features, cell, params, inputs, ros_ns: i64::MIN };
+    let mut worker =
+        ArmWorker { link, port: Arc::clone(port), features, cell, params, inputs, ros_ns: i64::MIN, way_out: None };
     let run = move || {
         let EndsArm(stops) = &ends;
         match kind {
@@ -390,9 +393,9 @@ impl ArmWorker {
     ) -> ProbeResult {
         let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
         let Some(state) = self.link.common.last() else { return not_ready("nothing has come from the arm yet") };
-        let (cell, params, flag) = (self.cell.clone(), wanted.params.clone(), *target);
+        let (cell, params, flag, way_out) = (self.cell.clone(), wanted.params.clone(), *target, self.way_out.clone());
         let ready = ask_mesh(&self.link.setup, move |still| {
-            let planned = plan(&cell, &params, &still, &flag, &state);
+            let planned = plan(&cell, &params, &still, &flag, &state, way_out.as_ref());
             (still, planned)
         });
         let Some((still, planned)) = self.wait(arm, &ready) else {
@@ -414,7 +417,10 @@ impl ArmWorker {
             // there is no such pattern, or no such number
             Err(error) => return refused(target, ProbeResult::BAD_REQUEST, format!("nothing is planned: {error}")),
         }
-        let probed = Prober::new(arm, &self.cell, &wanted.params, &mut world).probe(target);
+        let prober = Prober::new(arm, &self.cell, &wanted.params, &mut world);
+        let mut prober = prober.leaving_by(self.way_out.take());
+        let probed = prober.probe(target);
+        self.way_out = prober.into_way_out();
         self.link.common.stops.enter(Motion::Rests);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");
         if let Ending::Stopped(_) = &probed.ending {

@@ -3,6 +3,7 @@ mod interrupted;
 mod planning;
 mod sliding;
 mod uncertainty;
+mod way_out;
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 pub use planning::StaticScan;

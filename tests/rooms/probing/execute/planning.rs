@@ -408,7 +408,7 @@ fn a_dry_run_moves_nothing() {
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start).unwrap();
     let now = arm.next_state().unwrap();
     let world = StaticScan::new(plate_scan(1));
-    let planned = plan(&cell, &params(), &world, &HOLE, &now).unwrap();
+    let planned = plan(&cell, &params(), &world, &HOLE, &now, None).unwrap();
     assert!(!planned.touches.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
     assert_eq!(arm.at_rest_since(), 0.0);
 }
@@ -547,7 +547,7 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
             let [a, b, c] = faces[rng.random_range(0..faces.len())];
             let place = Point3::from((a.coords + b.coords + c.coords) / 3.0);
             let flag = Flag { id: 1, kind, place, radius: 4e-3 };
-            let planned = plan(&cell, &params, &world, &flag, &now).unwrap();
+            let planned = plan(&cell, &params, &world, &flag, &now, None).unwrap();
             moves.plans += 1;
             for (number, planned_touch) in planned.touches.iter().enumerate() {
                 if planned.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number)) {

@@ -218,7 +218,7 @@ fn slides_are_planned_and_checked() {
     let mut arm = SimArm::new(&plate, ArmParams::default(), &start()).unwrap();
     let now = arm.next_state().unwrap();
     let flag = flag(Some(Kind::Plane), [45e-3, 9e-3, TOP], 5e-3);
-    let planned = plan(&cell, &params, &world(), &flag, &now).unwrap();
+    let planned = plan(&cell, &params, &world(), &flag, &now, None).unwrap();
     assert_eq!((planned.slides.len(), planned.held_back.len()), (1, 0), "{:?}", planned.held_back);
     let on_path = |place: &Point3<f64>| planned.path.contains(place);
     assert!(planned.slides[0].stations.iter().all(|station| on_path(&station.centre)));
@@ -226,6 +226,6 @@ fn slides_are_planned_and_checked() {
     let floor = (cell.pose_bo * Point3::new(45e-3, 9e-3, TOP + BALL + 1e-3)).z;
     let lowest = Point3::new(-0.6, -0.3, floor);
     let narrow = ProbeParams { limits: Limits { lowest, ..params.limits.clone() }, ..params };
-    let planned = plan(&cell, &narrow, &world(), &flag, &now).unwrap();
+    let planned = plan(&cell, &narrow, &world(), &flag, &now, None).unwrap();
     assert!(planned.held_back.len() >= planned.touches.len().max(1), "{:?}", planned.held_back);
 }

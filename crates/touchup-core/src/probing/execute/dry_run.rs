@@ -6,6 +6,7 @@ use super::cell::Cell;
 use super::ending::Ending;
 use super::prober::{Flag, ProbeParams};
 use super::route::{FreeSpace, ToolState};
+use super::way_out::WayOut;
 use super::world::{World, distance};
 use crate::probing::arm::{ArmState, LimitError, Safety};
 use crate::probing::plan::{ExploreError, PatternParams, Slide, TouchPlan, TouchResult};
@@ -62,7 +63,7 @@ impl Cell {
 
 /// Plans the probing of a flag.
 ///
-/// - `now`: of the arm.
+/// - `now`: of the arm; `way_out`: of the feature that it was stopped in.
 ///
 /// # Errors
 /// [`ExploreError`] where there is no pattern for it.
@@ -72,11 +73,15 @@ pub fn plan(
     world: &dyn World,
     flag: &Flag,
     now: &ArmState,
+    way_out: Option<&WayOut>,
 ) -> Result<Plan, ExploreError> {
-    let (mut explorer, rotation) = flag.explorer(cell, params, world, now)?;
+    let way_out = way_out.filter(|way_out| way_out.begins_at(now));
+    let in_free_air = way_out.map_or(*now, |way_out| way_out.end(cell, now));
+    let (mut explorer, rotation) = flag.explorer(cell, params, world, &in_free_air)?;
     let space = FreeSpace { cell, limits: &params.limits, world };
-    let mut at = ToolState::of(cell, now);
-    let mut plan = Plan { path: vec![at.place], ..Plan::default() };
+    let mut at = ToolState::of(cell, &in_free_air);
+    let mut plan = Plan { path: vec![cell.place(&now.pose_bt)], ..Plan::default() };
+    plan.path.extend(way_out.into_iter().flat_map(WayOut::places));
     let reach = |allowed: Result<(), LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
         allowed?;
         let route = space.route(at, &rotation, above)?;

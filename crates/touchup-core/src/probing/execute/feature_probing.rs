@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
 use super::prober::{Flag, Prober};
 use super::route::ToolState;
+use super::way_out::WayOut;
 use super::world::{Phase, Progress, World};
 use crate::probing::arm::{
     ArmState, OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED,
@@ -80,10 +81,26 @@ impl<'a> Prober<'a> {
 
     /// The explorer and where the arm is, when both can begin.
     pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
+        self.leave(flag)?;
         let state = self.in_free_air(self.params.limits.tare)?;
         let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
         let probing = FeatureProbing::new(self, flag.id, rotation, &state);
         Ok((explorer, probing))
+    }
+
+    /// Out of the feature that another probing was stopped in, where the arm still stands there.
+    fn leave(&mut self, flag: &Flag) -> Result<(), Ending> {
+        let Some(way_out) = self.way_out.take() else { return Ok(()) };
+        let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
+        let now = self.arm.next_state().map_err(arm)?;
+        if !way_out.begins_at(&now) {
+            return Ok(());
+        }
+        let WayOut { from, entry, out, .. } = way_out;
+        let begun = FeatureProbing::new(self, flag.id, out.rotation, &now);
+        let mut probing = FeatureProbing { out, is_out: false, from, entry, ..begun };
+        let left = probing.retract();
+        probing.finish(left)
     }
 }
 
@@ -136,6 +153,7 @@ impl FeatureProbing<'_, '_> {
         let retracted = if may_move { self.retract() } else { Ok(()) };
         // where nothing comes any more it ended when it was seen last
         let last = self.prober.arm.next_state();
+        self.prober.way_out = last.as_ref().ok().and_then(|state| self.way_out(state));
         self.ended_ns = last.map_or(self.ended_ns, |state| state.stamp_ns.max(self.ended_ns));
         match retracted {
             Err(error) if is_unbroken => Err(error),
@@ -295,6 +313,12 @@ impl FeatureProbing<'_, '_> {
     fn retract(&mut self) -> Result<(), Ending> {
         self.prober.world.enter(Phase::Retract);
         self.go_out("retracting", LineGuard::Retract)
+    }
+
+    /// What remains of it; `None` in free air.
+    fn way_out(&self, now: &ArmState) -> Option<WayOut> {
+        let Self { from, entry, out, .. } = *self;
+        (!self.is_out).then_some(WayOut { stopped_bt: now.pose_bt, from, entry, out })
     }
 
     /// Back through the places where the ball has been before, none of them twice, whatever breaks off the remaining path.

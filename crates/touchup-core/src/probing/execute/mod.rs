@@ -17,6 +17,7 @@ mod route;
 mod sliding;
 mod sphere;
 mod tip;
+mod way_out;
 mod world;
 
 pub use cell::Cell;
@@ -29,4 +30,5 @@ pub use prober::{Flag, ProbeParams, Prober};
 pub use repeat::{Repeatability, SpotError, SpotTouch};
 pub use sphere::{SphereOrientation, SphereTouches};
 pub use tip::TipPoses;
+pub use way_out::WayOut;
 pub use world::{Phase, Progress, StaticWorld, World};

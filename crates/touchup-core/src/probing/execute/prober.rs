@@ -8,6 +8,7 @@ use super::cell::Cell;
 use super::ending::Ending;
 use super::links::{Clearance, LinkError, Tool};
 use super::route::FreeSpace;
+use super::way_out::WayOut;
 use super::world::{World, distance, normal_about, on_mesh};
 use crate::features::Kind;
 use crate::probing::arm::{Arm, ArmState, LimitError, Limits, Narrower, ProbeError, TouchParams, Watched};
@@ -92,12 +93,25 @@ pub struct Prober<'a> {
     pub(super) cell: &'a Cell,
     pub(super) params: &'a ProbeParams,
     pub(super) world: &'a mut dyn World,
+    pub(super) way_out: Option<WayOut>,
 }
 
 impl<'a> Prober<'a> {
-    /// - `arm`: at rest in free air.
+    /// - `arm`: at rest in free air, or where [`Self::leaving_by`] begins.
     pub fn new(arm: &'a mut dyn Arm, cell: &'a Cell, params: &'a ProbeParams, world: &'a mut dyn World) -> Self {
-        Self { arm, cell, params, world }
+        Self { arm, cell, params, world, way_out: None }
+    }
+
+    /// Has the next probing begin with the way out of the feature that another one was stopped in, where the arm still stands there.
+    #[must_use]
+    pub fn leaving_by(self, way_out: Option<WayOut>) -> Self {
+        Self { way_out, ..self }
+    }
+
+    /// The way out of the feature that the last probing was stopped in; `None`: the arm is in free air, or nothing is known of where
+    /// it is.
+    pub fn into_way_out(self) -> Option<WayOut> {
+        self.way_out
     }
 
     /// The arm, watched by all that watches it.

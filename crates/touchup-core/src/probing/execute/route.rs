@@ -10,7 +10,7 @@ use crate::probing::arm::{ArmBodies, ArmState, Capsule, Joints, LimitError, Limi
 use crate::probing::plan::{Slide, TouchPlan};
 
 /// Where the tool is, in free air.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ToolState {
     /// centre of the ball, m in O
     pub place: Point3<f64>,
