@@ -33,7 +33,13 @@ export class TipStep extends SetupStep {
       event.preventDefault();
       this.state();
     });
-    this.radius.addEventListener("input", () => this.read());
+    for (const each of [this.radius, this.uncertainty]) {
+      each.addEventListener("input", () => {
+        each.removeAttribute("aria-invalid");
+        this.say("");
+        this.read();
+      });
+    }
     this.body.append(el("p", { class: "question", text: "tipQuestion" }), this.known, form);
   }
 
@@ -61,7 +67,6 @@ export class TipStep extends SetupStep {
   private read(): void {
     const radius = typedMillimetres(this.radius.value);
     write(this.reading, radius === null ? "" : t("tipDiameter", { diameter: plain(2 * radius * 1e3) }));
-    if (radius !== null) this.radius.removeAttribute("aria-invalid");
   }
 
   private state(): void {

@@ -48,8 +48,8 @@ export const setupTexts = {
   // sensors
   checkTitle: ["Sensors", "Sensoren", "Sensores"],
   checkScene: ["What the scene knows of them. Without a calibration you can begin too; then it costs what is said.", "Was die Szene von ihnen weiß. Auch ohne Kalibrierung können Sie beginnen; dann kostet es, was da steht.", "Lo que la escena sabe de ellos. Sin calibrar también puede empezar; entonces cuesta lo que se indica."],
-  calibrationThere: ["calibrated", "kalibriert", "calibrado"],
-  calibrationMissing: ["not calibrated", "nicht kalibriert", "sin calibrar"],
+  calibrationThere: ["in the scene", "in der Szene", "en la escena"],
+  calibrationMissing: ["not in the scene", "nicht in der Szene", "no está en la escena"],
   calibrationScan: ["Place of the part", "Lage des Teils", "Posición de la pieza"],
   calibrationScanCost: ["Touches lie beside the part unless the tracking already gives places in the frame of the scan.", "Antastungen liegen neben dem Teil, es sei denn, das Tracking liefert schon Orte im System des Scans.", "Los toques caen fuera de la pieza, salvo que el seguimiento ya dé posiciones en el sistema del escaneo."],
   calibrationScanHow: ["Touch three or more marks of the part that the scan shows too; note both places.", "Tasten Sie drei oder mehr Marken des Teils an, die auch der Scan zeigt; notieren Sie beide Orte.", "Toque tres o más marcas de la pieza que también muestre el escaneo y anote ambas posiciones."],

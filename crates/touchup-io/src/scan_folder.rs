@@ -37,10 +37,12 @@ impl FolderFileKind {
     fn of_name(name: &str) -> Option<Self> {
         let extension = Path::new(name).extension()?.to_str()?.to_ascii_lowercase();
         let is_of = |known: &[&str]| known.contains(&extension.as_str());
-        match () {
-            () if is_of(SCAN_EXTENSIONS) => Some(Self::Scan),
-            () if is_of(RECORDING_EXTENSIONS) => Some(Self::Recording),
-            () => None,
+        if is_of(SCAN_EXTENSIONS) {
+            Some(Self::Scan)
+        } else if is_of(RECORDING_EXTENSIONS) {
+            Some(Self::Recording)
+        } else {
+            None
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The steps before a node: what was chosen so far, by whomever operates, and what the node began with or why it did not.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
@@ -176,7 +177,7 @@ impl NodeSetup {
         }
         let (setup, file) = (Arc::clone(self), name.to_owned());
         let read = move || {
-            let found = read_facts(&path, &file, setup.draft.unit_of(&file));
+            let found = to_its_end(|| read_facts(&path, &file, setup.draft.unit_of(&file)));
             locked(&setup.state).scan = found.map_or_else(|why| ScanChoice::Refused { file, why }, ScanChoice::Read);
         };
         if let Err(error) = Builder::new().name("setup-scan".to_owned()).spawn(read) {
@@ -261,7 +262,7 @@ impl NodeSetup {
         let check = move || {
             let (recording, topics) = (&*recording, &setup.topics);
             let inputs = CheckInputs { scan: (&scan, unit), recording, scene: &scene, topics };
-            let found = check_recording(&file, &inputs);
+            let found = to_its_end(|| check_recording(&file, &inputs));
             locked(&setup.state).check =
                 found.map_or_else(|why| CheckChoice::Refused { file, why }, CheckChoice::Found);
         };
@@ -329,6 +330,12 @@ impl Drop for UploadPlace {
     fn drop(&mut self) {
         locked(&self.0.state).upload = None;
     }
+}
+
+/// What comes of work beside: nobody waits for what ended by a fault.
+fn to_its_end<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    let fault = || "a fault of touchup ended this: please report it with the file, and choose another one".to_owned();
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(fault()))
 }
 
 /// Whether both lie in one folder.

@@ -68,15 +68,12 @@ impl Served {
     }
 
     /// Does what an operator asks for, and answers how it is then.
-    async fn change<T: DeserializeOwned>(
+    async fn change<T: DeserializeOwned + Send + 'static>(
         &self,
         headers: &HeaderMap,
         body: Body,
         change: impl FnOnce(&Arc<NodeSetup>, T) -> Result<(), NodeSetupError> + Send + 'static,
-    ) -> Answered
-    where
-        T: Send + 'static,
-    {
+    ) -> Answered {
         self.operator(headers)?;
         let bad = |status, why: String| Box::new(refusal(status, &why));
         let text = to_bytes(body, LARGEST_REQUEST).await;
