@@ -4,7 +4,7 @@ import "./style.css";
 import { Connection } from "./connection";
 import { t } from "./language";
 import { buildPage } from "./page";
-import { applyTheme } from "./settings_menu";
+import { followTheme } from "./settings_menu";
 import { buildSetupPage } from "./setup_page";
 import { askSetup } from "./setup_state";
 
@@ -12,7 +12,7 @@ const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.h
 void begin();
 
 async function begin(): Promise<void> {
-  applyTheme();
+  followTheme();
   const setup = await askSetup();
   if (setup !== null && setup !== "running") return buildSetupPage(setup);
   const connection = new Connection(address);

@@ -49,7 +49,15 @@ function themes(onTheme: () => void): HTMLSelectElement {
   return choice;
 }
 
-/** Before anything asks the style sheet for a colour. */
-export function applyTheme(): void {
-  document.documentElement.dataset.theme = settings.theme;
+const DEVICE_IS_DARK = matchMedia("(prefers-color-scheme: dark)");
+
+/** Before anything asks the style sheet for a colour, and again whenever the device changes its own. */
+export function followTheme(): void {
+  applyTheme();
+  DEVICE_IS_DARK.addEventListener("change", applyTheme);
+}
+
+function applyTheme(): void {
+  const { theme } = settings;
+  document.documentElement.dataset.theme = theme === "auto" ? (DEVICE_IS_DARK.matches ? "dark" : "light") : theme;
 }
