@@ -191,14 +191,23 @@ pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
     for entry in fs::read_dir(parent)? {
         let entry = entry?;
         let name = entry.file_name().into_string().unwrap_or_default();
-        if entry.file_type()?.is_dir() && is_plain_name(&name) {
+        if still_there(entry.file_type())?.is_some_and(|kind| kind.is_dir()) && is_plain_name(&name) {
             names.push(name);
         }
     }
     names.sort();
     names.reverse();
     names.truncate(MOST_LISTED);
-    names.into_iter().map(|name| listed(parent, name)).collect()
+    let listed = names.into_iter().filter_map(|name| still_there(listed(parent, name)).transpose());
+    listed.collect()
+}
+
+/// `None` for what went while it was looked at, as a file that is written beside another and then takes its place.
+fn still_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
+    match found {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
@@ -206,7 +215,7 @@ fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
     for entry in fs::read_dir(parent.join(&session.name))? {
         let entry = entry?;
         let file = entry.file_name().into_string().unwrap_or_default();
-        let about = entry.metadata()?;
+        let Some(about) = still_there(entry.metadata())? else { continue };
         if about.is_file() && is_plain_name(&file) {
             session.bytes += about.len();
             session.files.push(file);
@@ -284,6 +293,8 @@ pub fn fingerprint(path: &Path) -> io::Result<(PathBuf, u32)> {
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::symlink;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::thread;
 
     use super::*;
 
@@ -313,6 +324,22 @@ mod tests {
             files: files.iter().map(|&file| file.to_owned()).collect(),
         };
         assert_eq!(listed, [session("two", 6, &["a.ply", "b.json"]), session("one", 3, &["a.ply"])]);
+    }
+
+    #[test]
+    fn files_may_come_and_go_while_sessions_are_listed() {
+        let folder = sessions();
+        let is_over = AtomicBool::new(false);
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    write_text_file(&folder.path().join("two/b.json"), "{}").unwrap();
+                }
+            });
+            let listed: Vec<_> = (0..3000).map(|_| list_sessions(folder.path())).collect();
+            is_over.store(true, Ordering::Relaxed);
+            assert!(listed.into_iter().all(|listed| listed.unwrap().len() == 2));
+        });
     }
 
     #[test]
