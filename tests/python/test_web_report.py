@@ -231,7 +231,6 @@ def test_an_operator_makes_a_report_by_clicks_and_sees_the_decisions(browser, to
     report.wait_for_load_state()
     assert report.url.endswith("/api/reports/over")
     assert "Plate <4711>" in report.locator("h1 + dl").inner_text()
-    report.screenshot(path=tmp_path / "html.png")
     report.close()
     with page.expect_download() as saving:
         result.get_by_role("link", name="CSV").click()

@@ -55,7 +55,8 @@ fn every_message_is_on_the_wire_as_rosbags_has_it() {
         TriggerRequest TriggerResponse SetBoolRequest SetBoolResponse
         Feature FeatureArray FormDeviation HapticMismatch MeshPatch ProbeResult ProbeSettings ProbeTouch Relation
         DetectFeaturesRequest DetectFeaturesResponse FlagFeatureRequest FlagFeatureResponse ProbeFeatureRequest
-        ProbeFeatureResponse ResyncMeshRequest ResyncMeshResponse SaveMeshRequest SaveMeshResponse UndoRequest UndoResponse
+        ProbeFeatureResponse ResyncMeshRequest ResyncMeshResponse SaveMeshRequest SaveMeshResponse TakeOutTouchRequest
+        TakeOutTouchResponse UndoRequest UndoResponse
         UnflagFeatureRequest UnflagFeatureResponse ProbeGoal ProbeResponse ProbeFeedback
     );
 }
