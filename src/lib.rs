@@ -28,8 +28,6 @@ pub use touchup_session::{clock, input_check, live, replay, scan, scene, session
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
-// without the page nothing writes a whole report into a folder
-#[cfg_attr(not(feature = "web"), allow(dead_code))]
 mod inspection;
 pub mod log_lines;
 #[cfg(any(feature = "ros", feature = "r2r"))]

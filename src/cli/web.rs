@@ -169,7 +169,7 @@ impl WebFlags {
         files.map(|(chain, key)| Certificate { chain, key })
     }
 
-    /// The server, where a page is wanted; nobody has been told of it.
+    /// The server, where a page is wanted; it is not announced yet.
     #[cfg(feature = "web")]
     fn listening(&self) -> Result<Option<WebServer>, CliError> {
         let Some(address) = self.web else { return Ok(None) };

@@ -26,6 +26,8 @@ pub struct ReportFiles {
     pub qif: Option<PathBuf>,
 }
 
+/// A report whole, as the page makes it.
+#[cfg(feature = "web")]
 impl ReportFiles {
     /// Names of all of them in the folder of a session: HTML, CSV, JSON, QIF.
     pub const NAMES: [&str; 4] = ["report.html", "results.csv", "results.json", "results.qif"];
@@ -35,7 +37,9 @@ impl ReportFiles {
         let [html, csv, json, qif] = Self::NAMES.map(|name| Some(folder.join(name)));
         Self { html, csv, json, qif }
     }
+}
 
+impl ReportFiles {
     /// Writes each as a whole; nothing, unless the report could be made.
     ///
     /// # Errors

@@ -154,7 +154,7 @@ pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], json!({ "error": why }).to_string()).into_response()
 }
 
-/// What the page is told.
+/// An answer that no cache keeps.
 pub(super) fn as_json(value: &impl serde::Serialize) -> Response {
     let text = serde_json::to_string(value).unwrap_or_default();
     ([(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text).into_response()
