@@ -10,7 +10,7 @@ use super::arguments::NodeConfig;
 use super::clock::RosClock;
 use super::inbox::Inbox;
 use super::names::NameError;
-use super::port::{Port, Publication, Reply};
+use super::port::{MESH_PATCH_TOPIC, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
 
 /// Why the node cannot speak to others.
@@ -41,6 +41,8 @@ pub(super) struct Exchange {
     pub node_name: String,
     /// of wrenches and of poses, whole
     sample_topics: [String; 2],
+    /// whole
+    mesh_patch_topic: String,
     pub clock: RosClock,
     /// what is small and urgent, answers among it
     pub urgent: SendQueue,
@@ -55,6 +57,7 @@ impl Exchange {
             inbox,
             // a name that is none is refused where the topic is listened to
             sample_topics: config.sample_topics().map(|name| config.resolve(name).unwrap_or_default()),
+            mesh_patch_topic: config.resolve(MESH_PATCH_TOPIC).unwrap_or_default(),
             node_name: config.place.full_name(),
             clock: RosClock::new(config.parameters.bool("use_sim_time")),
             urgent: SendQueue::default(),
@@ -143,6 +146,10 @@ impl<C: Send + Sync> Port for Joined<C> {
 
     fn sample_topics(&self) -> [&str; 2] {
         self.exchange.sample_topics.each_ref().map(String::as_str)
+    }
+
+    fn mesh_patch_topic(&self) -> &str {
+        &self.exchange.mesh_patch_topic
     }
 
     fn now_ns(&self) -> i64 {

@@ -49,6 +49,10 @@ impl Port for InProcess {
         ["/stylus/wrench", "/stylus/pose"]
     }
 
+    fn mesh_patch_topic(&self) -> &str {
+        "/mesh_patch"
+    }
+
     fn now_ns(&self) -> i64 {
         let (now_ns, at) = *locked(&self.now_ns);
         now_ns + self.clock.since(at).as_nanos() as i64

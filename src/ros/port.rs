@@ -14,6 +14,9 @@ use crate::reconstruct::Patcher;
 /// Tiles that a port keeps for who joins late, the latest, and that are on their way at most: 4 MB.
 pub const TILES_KEPT: usize = 64;
 
+/// The topic that followers of the mesh listen to.
+pub const MESH_PATCH_TOPIC: &str = "mesh_patch";
+
 /// Something that came in.
 #[derive(Debug)]
 pub enum Arrival {
@@ -186,6 +189,9 @@ pub trait Port: Send + Sync {
 
     /// Names of the topics that wrenches and poses come on, whole, as [`Endpoint::topic`] has them.
     fn sample_topics(&self) -> [&str; 2];
+
+    /// Name of the topic that followers of the mesh listen to, whole, as [`Endpoint::topic`] has it.
+    fn mesh_patch_topic(&self) -> &str;
 
     /// Time of ROS, ns: the system's, or that of `/clock` with `use_sim_time`.
     fn now_ns(&self) -> i64;

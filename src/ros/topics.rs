@@ -8,7 +8,7 @@ use super::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped,
     PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
 };
-use super::port::{Arrival, Publication};
+use super::port::{Arrival, MESH_PATCH_TOPIC, Publication};
 use super::send_queue::Sent;
 
 /// A topic and its quality of service.
@@ -40,7 +40,7 @@ impl Topic {
 
 pub(super) const MESH: Topic = Topic::latched("mesh", 4096);
 pub(super) const PROBE_TOUCHES: Topic = Topic::reliable("probe_touches", 4096);
-pub(super) const MESH_PATCH: Topic = Topic::reliable("mesh_patch", 4096);
+pub(super) const MESH_PATCH: Topic = Topic::reliable(MESH_PATCH_TOPIC, 4096);
 
 /// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no matter of matching.
 const SAMPLES: usize = 2048;

@@ -215,6 +215,21 @@ def test_a_follower_that_loses_messages_has_the_bytes_that_are_saved(demo_folder
         saved = trimesh.load(answer[-1].path, process=False)
         of_file = in_order(enumerate(numpy.asarray(saved.vertices) * 1e-3), saved.faces)
         assert of_file == in_order(follower.vertices.items(), follower.faces.values())
+        # at rest all that was touched gets its variance: the square of what the file has
+        touched, variances = [], []
+
+        def is_known():
+            follows(0.0)
+            places = follower.vertices.values()
+            touched[:] = [place[:3] for place in places if place[4] == 1]
+            variances[:] = [place[3] for place in places if place[4] == 1]
+            return len(touched) > 100 and numpy.isfinite(variances).all()
+
+        node.wait_for(is_known)
+        sigmas = saved.metadata["_ply_raw"]["vertex"]["data"]["sigma_mm"].ravel()
+        far, at = KDTree(saved.vertices).query(numpy.array(touched) * 1e3)
+        assert far.max() < 1e-3 and numpy.abs(numpy.sqrt(variances) * 1e3 / sigmas[at] - 1).max() < 1e-3
+        assert in_order(follower.vertices.items(), follower.faces.values()) == of_file
         assert node.end() in (0, 4), node.text()
 
 

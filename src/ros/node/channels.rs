@@ -7,6 +7,7 @@ use std::sync::mpsc::SyncSender;
 use nalgebra::Point3;
 
 use super::replica::{Edits, MeshVersion};
+use super::vertex_variance::Variances;
 use crate::features::Feature;
 use crate::live::TouchDelta;
 use crate::probing::execute::Flag;
@@ -21,6 +22,8 @@ use crate::ros::port::Reply;
 pub enum ViewInput {
     /// the mesh changed
     Edits(Box<Edits>),
+    /// how well vertices are known is known
+    Variances(Variances),
     /// a new session
     Session(Box<MeshVersion>),
     /// one sample

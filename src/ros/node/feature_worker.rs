@@ -148,13 +148,13 @@ impl FeatureWorker {
 
     /// Whether the mesh is another one than at the last look, and now is the time.
     fn is_due(&mut self) -> bool {
-        let version = self.shared.mesh.version();
+        let version = self.shared.mesh.shape_version();
         if std::mem::replace(&mut self.seen_version, version) != version {
             self.changed_at = self.clock.now();
         }
         match self.looked {
             None => true,
-            Some((looked, _)) if looked == version => false,
+            Some((looked, _)) if looked >= version => false,
             Some(_) => {
                 let since_look = self.clock.since(self.looked_at);
                 let is_quiet = self.clock.since(self.changed_at) >= QUIET;

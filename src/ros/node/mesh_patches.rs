@@ -78,6 +78,11 @@ impl MeshPatches {
         edits.faces.iter().for_each(|(face, _)| self.faces.changed.insert(*face));
     }
 
+    /// Remembers that something of vertices changed that are where they were.
+    pub fn note_vertices(&mut self, vertices: impl IntoIterator<Item = u32>) {
+        vertices.into_iter().for_each(|vertex| self.vertices.changed.insert(vertex));
+    }
+
     /// The change from what followers have to what the replica has, in parts; none when it is the same.
     pub fn change(&mut self, replica: &MeshVersion, frame: &str) -> Vec<MeshPatch> {
         let is_same = self.vertices.changed.is_empty() && self.faces.changed.is_empty();
@@ -149,9 +154,11 @@ impl DraftPatch {
             face_count,
             ..MeshPatch::default()
         };
-        for (position, support) in message.vertices.iter().filter_map(|&vertex| replica.vertex(vertex)) {
+        for (vertex, (position, support)) in
+            message.vertices.iter().filter_map(|&vertex| Some((vertex, replica.vertex(vertex)?)))
+        {
             message.positions.extend(position.coords.iter().map(|x| *x as f32));
-            message.variance.push(if support == Support::Scan { scan } else { f32::NAN });
+            message.variance.push(if support == Support::Scan { scan } else { replica.variance(vertex) });
             message.support.push(number_of(support));
         }
         message.corners = message.faces.iter().filter_map(|&face| replica.face(face)).flatten().collect();

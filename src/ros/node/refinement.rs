@@ -24,6 +24,7 @@ use super::setup::Setup;
 use super::side_work::SideWork;
 use super::streams::StreamWatch;
 use super::take_out::TakingOut;
+use super::vertex_variance::VarianceWork;
 use crate::haptic::RefineError;
 use crate::live::LiveError;
 use crate::ros::inbox::Arrivals;
@@ -101,6 +102,8 @@ pub struct RefinementWorker {
     pub(super) side_work: SideWork,
     /// a touch that is being taken out or put back
     pub(super) taking_out: Option<TakingOut>,
+    /// how well vertices are known, for who follows the mesh
+    pub(super) variance: VarianceWork,
     pub(super) sampled: Instant,
     edits_sent: Instant,
     pub(super) tip_published: Instant,
@@ -127,6 +130,7 @@ impl RefinementWorker {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
             taking_out: None,
+            variance: VarianceWork::default(),
             doubts: InputDoubts::on(&setup.clock),
             resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
@@ -387,6 +391,7 @@ impl RefinementWorker {
             }
             self.go_on_taking_out();
             self.send_edits();
+            self.go_on_with_variance(now);
             self.send_probed();
             self.retry_waiting();
             self.watch_streams();

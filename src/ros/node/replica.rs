@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex};
 
 use nalgebra::Point3;
 
+use super::vertex_variance::Variances;
 use crate::clock::{Clock, Working};
 use crate::live::{Engine, LiveError};
 use crate::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
@@ -105,10 +106,14 @@ pub struct MeshVersion {
     pub session: String,
     /// state of the mesh, as in `MeshPatch`
     pub version: u64,
+    /// … that its shape came with: in later ones only variances are others
+    pub shape_version: u64,
     /// stamp of the newest sample in it, ns
     pub stamp_ns: i64,
     positions: Vec<Point3<f64>>,
     support: Vec<Option<Support>>,
+    /// along the normal, m²; NaN where it is not known
+    variance: Vec<f32>,
     /// faces at each vertex: what no face uses is not shown
     uses: Vec<u32>,
     corners: Vec<[u32; 3]>,
@@ -131,9 +136,11 @@ impl MeshVersion {
         Self {
             session: session.to_owned(),
             version: 1,
+            shape_version: 1,
             stamp_ns: 0,
             positions: scan.positions().to_vec(),
             support: (0..slots).map(is_there).collect(),
+            variance: vec![f32::NAN; scan.vertex_slots()],
             uses,
             corners,
             counts: [used as u32, scan.face_count() as u32],
@@ -146,6 +153,7 @@ impl MeshVersion {
             self.make_room(vertex);
             let at = vertex as usize;
             self.support[at] = place.map(|(_, support)| support);
+            self.variance[at] = f32::NAN;
             if let Some((position, _)) = place {
                 self.positions[at] = position;
             }
@@ -178,9 +186,18 @@ impl MeshVersion {
             }
         }
         if edits.is_complete {
-            (self.version, self.stamp_ns) = (edits.version, edits.stamp_ns);
+            (self.version, self.shape_version, self.stamp_ns) = (edits.version, edits.version, edits.stamp_ns);
         }
         turned
+    }
+
+    /// Takes variances up; which vertices have others now.
+    pub fn apply_variances(&mut self, variances: &Variances) -> Vec<u32> {
+        self.version = variances.version;
+        let known = variances.of.iter().filter(|(vertex, _)| self.vertex(*vertex).is_some()).copied();
+        let known: Vec<_> = known.collect();
+        known.iter().for_each(|&(vertex, variance)| self.variance[vertex as usize] = variance);
+        known.into_iter().map(|(vertex, _)| vertex).collect()
     }
 
     fn make_room(&mut self, vertex: u32) {
@@ -188,6 +205,7 @@ impl MeshVersion {
         if slots > self.positions.len() {
             self.positions.resize(slots, Point3::origin());
             self.support.resize(slots, None);
+            self.variance.resize(slots, f32::NAN);
             self.uses.resize(slots, 0);
         }
     }
@@ -202,6 +220,18 @@ impl MeshVersion {
         let at = vertex as usize;
         let is_used = self.uses.get(at).is_some_and(|uses| *uses > 0);
         is_used.then_some((*self.positions.get(at)?, (*self.support.get(at)?)?))
+    }
+
+    /// Variance along the normal of a vertex that was touched, m²; NaN where it is not known.
+    pub fn variance(&self, vertex: u32) -> f32 {
+        self.variance.get(vertex as usize).copied().unwrap_or(f32::NAN)
+    }
+
+    /// The vertices that do not rest on the scan: number, place, m, and what it rests on.
+    pub fn touched(&self) -> impl Iterator<Item = (u32, Point3<f64>, Support)> + '_ {
+        let all = (0..self.positions.len() as u32).filter_map(|vertex| Some((vertex, self.vertex(vertex)?)));
+        all.filter(|(_, (_, support))| *support != Support::Scan)
+            .map(|(vertex, (place, support))| (vertex, place, support))
     }
 
     /// Corners of a face; `None` where there is none.
@@ -233,6 +263,7 @@ pub struct MeshReplica {
     /// the last complete state that is on its way to the writer, or with it
     announced: Mutex<Revision>,
     version: AtomicU64,
+    shape_version: AtomicU64,
 }
 
 #[derive(Debug)]
@@ -251,7 +282,13 @@ impl MeshReplica {
     pub fn new(clock: Clock, scan: &TriMesh) -> Self {
         let mesh = Arc::new(MeshVersion::of(scan, ""));
         let state = ReplicaState { mesh, session: 0, is_complete: true, is_closed: false, waiting: Vec::new() };
-        Self { clock, state: Mutex::new(state), announced: Mutex::new((0, 1)), version: AtomicU64::new(1) }
+        Self {
+            clock,
+            state: Mutex::new(state),
+            announced: Mutex::new((0, 1)),
+            version: AtomicU64::new(1),
+            shape_version: AtomicU64::new(1),
+        }
     }
 
     /// Names the first session.
@@ -279,6 +316,14 @@ impl MeshReplica {
         turned
     }
 
+    /// Takes variances up; as [`MeshVersion::apply_variances`].
+    pub fn apply_variances(&self, variances: &Variances) -> Vec<u32> {
+        let mut state = locked(&self.state);
+        let changed = Arc::make_mut(&mut state.mesh).apply_variances(variances);
+        self.answer(&mut state);
+        changed
+    }
+
     /// Goes over to another session.
     pub fn begin_session(&self, mesh: MeshVersion) {
         let mut state = locked(&self.state);
@@ -297,6 +342,11 @@ impl MeshReplica {
     /// The version that it has got to.
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::Relaxed)
+    }
+
+    /// The version that its shape came with: in later ones only variances are others.
+    pub fn shape_version(&self) -> u64 {
+        self.shape_version.load(Ordering::Relaxed)
     }
 
     /// As it is now, and whether it is complete: for the writer.
@@ -320,6 +370,7 @@ impl MeshReplica {
 
     fn answer(&self, state: &mut ReplicaState) {
         self.version.store(state.mesh.version, Ordering::Relaxed);
+        self.shape_version.store(state.mesh.shape_version, Ordering::Relaxed);
         if !state.is_complete {
             return;
         }
@@ -424,6 +475,29 @@ mod tests {
         assert_eq!(read(&of_the_next), [None]);
         replica.begin_session(MeshVersion::of(&strip(10), "next"));
         assert_eq!((read(&of_the_next), replica.version()), (vec![Some(1)], 1));
+    }
+
+    #[test]
+    fn a_variance_is_of_the_next_version_and_goes_when_its_vertex_moves() {
+        let replica = MeshReplica::new(Clock::system(), &strip(10));
+        let touched = |x: f64| Some((Point3::new(x, 8.0, 9.0), Support::Touched));
+        let mut moved = version(2, true);
+        moved.vertices.extend([(0, touched(1.0)), (1, touched(2.0)), (500, touched(3.0))]);
+        replica.apply(&moved);
+        let numbers: Vec<u32> = replica.now().0.touched().map(|(vertex, ..)| vertex).collect();
+        assert_eq!(numbers, [0, 1], "no face uses the last");
+        replica.announce(3);
+        let waiting = replica.complete();
+        let changed =
+            replica.apply_variances(&Variances { version: 3, of: vec![(0, 1e-10), (1, 4e-10), (500, 1e-10)] });
+        assert_eq!((changed, waiting.try_recv().unwrap().version), (vec![0, 1], 3));
+        assert_eq!((replica.version(), replica.shape_version()), (3, 2));
+        let mut again = version(4, true);
+        again.vertices.push((1, touched(2.5)));
+        replica.apply(&again);
+        let (mesh, _) = replica.now();
+        assert_eq!((mesh.variance(0), mesh.variance(1).is_nan(), mesh.variance(7).is_nan()), (1e-10, true, true));
+        assert_eq!(replica.shape_version(), 4);
     }
 
     #[test]

@@ -90,6 +90,9 @@ impl View {
                 // as many come back as went out
                 let _ = self.spare.try_send(edits);
             }
+            ViewInput::Variances(variances) => {
+                self.patches.note_vertices(self.shared.mesh.apply_variances(&variances));
+            }
             ViewInput::Session(replica) => {
                 self.tiles.restart(&replica);
                 self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);

@@ -171,9 +171,9 @@ impl Board {
         locked(&self.mesh).next_for(page)
     }
 
-    /// Session and version of the mesh.
-    pub fn mesh_state(&self) -> MeshState {
-        locked(&self.mesh).state()
+    /// Session of the mesh, and the version that its shape came with.
+    pub fn shape_state(&self) -> MeshState {
+        locked(&self.mesh).shape_state()
     }
 
     /// The vertices that rest on touches.
@@ -190,7 +190,7 @@ impl Board {
     /// … that is the one in which the mesh is now.
     pub fn known(&self) -> Option<Arc<Known>> {
         let known = locked(&self.known).clone()?;
-        (known.state == self.mesh_state()).then_some(known)
+        (known.state == self.shape_state()).then_some(known)
     }
 
     /// Name of the session.

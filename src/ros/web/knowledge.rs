@@ -32,7 +32,7 @@ pub(super) async fn follow(site: Arc<Site>) {
     let (mut seen, mut still, mut done) = (MeshState::default(), Instant::now(), MeshState::default());
     loop {
         sleep(LOOK).await;
-        let state = site.board.mesh_state();
+        let state = site.board.shape_state();
         if state != seen {
             (seen, still) = (state, Instant::now());
             continue;

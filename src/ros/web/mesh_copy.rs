@@ -18,7 +18,7 @@ const NO_VERTEX: u8 = u8::MAX;
 /// Corners of a face that is not there.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
 
-/// A state of the mesh: session and version.
+/// A state of the shape of the mesh: session and version.
 pub(super) type MeshState = (String, u64);
 /// A vertex that rests on touches: its number, its place, m in O, and its support.
 pub(super) type TouchedVertex = (u32, Point3<f64>, Support);
@@ -53,6 +53,8 @@ pub(super) struct MeshCopy {
     frame: String,
     session: String,
     version: u64,
+    /// … in which the shape changed last: in later ones only variances are others
+    shape_version: u64,
     stamp: Time,
     /// m
     positions: Vec<[f32; 3]>,
@@ -114,6 +116,8 @@ impl MeshCopy {
     }
 
     fn apply(&mut self, patch: &MeshPatch) {
+        let mut is_shape =
+            !patch.removed_faces.is_empty() || !patch.faces.is_empty() || !patch.removed_vertices.is_empty();
         for &face in &patch.removed_faces {
             self.set_face(face, NO_FACE);
         }
@@ -125,6 +129,7 @@ impl MeshCopy {
                 self.variance.resize(at + 1, f32::NAN);
                 self.support.resize(at + 1, NO_VERTEX);
             }
+            is_shape |= (self.positions[at], self.support[at]) != (*position, *support);
             (self.positions[at], self.variance[at], self.support[at]) = (*position, *variance, *support);
             self.lack_vertex(vertex);
         }
@@ -136,6 +141,9 @@ impl MeshCopy {
                 *support = NO_VERTEX;
                 self.lack_vertex(vertex);
             }
+        }
+        if is_shape {
+            self.shape_version = patch.version;
         }
         if patch.part + 1 == patch.part_count {
             (self.version, self.stamp) = (patch.version, patch.header.stamp);
@@ -171,9 +179,9 @@ impl MeshCopy {
         self.pages.remove(&page);
     }
 
-    /// Session and version.
-    pub fn state(&self) -> MeshState {
-        (self.session.clone(), self.version)
+    /// Session, and the version that the shape came with.
+    pub fn shape_state(&self) -> MeshState {
+        (self.session.clone(), self.shape_version)
     }
 
     /// The vertices that rest on touches, on a guess between them or beside them.
@@ -341,6 +349,22 @@ mod tests {
         page.catch_up(&mut copy, 1);
         assert_eq!((page.session.as_str(), page.vertices[&2]), ("b", [7.0; 3]));
         assert_eq!(page.faces.len(), 1);
+    }
+
+    /// What was touched is known when the mesh rests: nothing of its shape is to be evaluated again for that.
+    #[test]
+    fn a_variance_comes_to_the_pages_and_is_no_other_shape() {
+        let mut copy = MeshCopy::default();
+        copy.take(triangle("a"));
+        copy.join(1);
+        Page::default().catch_up(&mut copy, 1);
+        assert_eq!(copy.shape_state(), ("a".to_owned(), 1));
+        copy.take(MeshPatch { variance: vec![1e-10], ..patch("a", [1, 2], &[(1, 1.0)], &[]) });
+        let shown = copy.next_for(1).unwrap();
+        assert_eq!((shown.version, shown.vertices, shown.variance), (2, vec![1], vec![1e-10]));
+        assert_eq!(copy.shape_state(), ("a".to_owned(), 1));
+        copy.take(patch("a", [2, 3], &[(1, 1.5)], &[]));
+        assert_eq!(copy.shape_state(), ("a".to_owned(), 3));
     }
 
     #[test]

@@ -238,6 +238,10 @@ impl Port for PagePort {
         self.network.sample_topics()
     }
 
+    fn mesh_patch_topic(&self) -> &str {
+        self.network.mesh_patch_topic()
+    }
+
     fn now_ns(&self) -> i64 {
         self.network.now_ns()
     }

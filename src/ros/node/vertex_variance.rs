@@ -1,0 +1,135 @@
+//! The variance of what was touched, for `MeshPatch`: evaluated on a thread of its own once the mesh rests, where somebody follows it.
+//!
+//! The mesh with it is the next version, so that a follower takes it up as any other change; no vertex moves by it.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::time::{Duration, Instant};
+
+use nalgebra::Point3;
+use tracing::warn;
+
+use super::channels::ViewInput;
+use super::refinement::RefinementWorker;
+use crate::mesh::{FaceTree, TriMesh};
+use crate::reconstruct::{Patcher, Support};
+
+/// Without a sample for so long the variance is evaluated: longer than the node takes to settle the mesh.
+const KNOWN_AFTER: Duration = Duration::from_millis(1000);
+/// How long the copies of mesh and evidence may take.
+const COPY_WAIT: Duration = Duration::from_secs(30);
+
+/// Number of a vertex, and its variance along the normal, m².
+pub type VertexVariance = (u32, f32);
+
+/// Variances of vertices, those that are others than before.
+#[derive(Debug)]
+pub struct Variances {
+    /// state of the mesh with these in it
+    pub version: u64,
+    /// …
+    pub of: Vec<VertexVariance>,
+}
+
+/// Session and version.
+type State = (String, u64);
+
+/// What is evaluated now, and what was.
+#[derive(Debug, Default)]
+pub(super) struct VarianceWork {
+    done: Option<State>,
+    made: Option<(State, Receiver<Vec<VertexVariance>>)>,
+}
+
+impl RefinementWorker {
+    /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never waits.
+    pub(super) fn go_on_with_variance(&mut self, now: Instant) {
+        let is_done = self.variance.done.as_ref().is_some_and(|of| self.is_state(of));
+        if let Some((of, made)) = self.variance.made.take() {
+            match made.try_recv() {
+                // at most one is made at a time, also where the mesh has gone on
+                Err(TryRecvError::Empty) => self.variance.made = Some((of, made)),
+                Ok(variances) if self.is_state(&of) && self.is_at_rest(now) => self.send_variances(of, variances),
+                Ok(_) => {}
+                // without thread, mesh or evidence: the next change of the mesh tries again
+                Err(TryRecvError::Disconnected) => self.variance.done = Some(of),
+            }
+        } else if !is_done && self.is_followed() && self.is_at_rest(now) {
+            self.begin_variances((self.session.folder.name().to_owned(), self.session.version));
+        }
+    }
+
+    fn is_state(&self, (session, version): &State) -> bool {
+        session == self.session.folder.name() && *version == self.session.version
+    }
+
+    /// Whether the mesh is complete, on its way to the view, and what a file would have.
+    fn is_at_rest(&self, now: Instant) -> bool {
+        let session = &self.session;
+        let is_sent = session.version == session.sent_version && session.engine.edits() == session.sent_edits;
+        let is_quiet = now.saturating_duration_since(self.sampled) >= KNOWN_AFTER;
+        is_quiet && is_sent && session.engine.is_settled() && !self.is_taking_out() && self.fault.is_none()
+    }
+
+    /// Whether somebody listens to `mesh_patch`.
+    fn is_followed(&self) -> bool {
+        self.endpoints.get(self.port.mesh_patch_topic()).is_some_and(|endpoint| endpoint.count > 0)
+    }
+
+    fn begin_variances(&mut self, state: State) {
+        let Ok(Some(copy)) = self.session.engine.copy_patcher() else {
+            // nothing was touched, or there is no patch
+            self.variance.done = Some(state);
+            return;
+        };
+        let (setup, snapshot) = (Arc::clone(&self.setup), self.setup.shared.mesh.complete());
+        let (to, made) = sync_channel(1);
+        let asked = state.clone();
+        let work = move || {
+            let snapshot = setup.clock.recv_timeout(&snapshot, COPY_WAIT).ok();
+            let Some(mesh) = snapshot.filter(|mesh| (&mesh.session, mesh.version) == (&asked.0, asked.1)) else {
+                return;
+            };
+            let Ok(mut patcher) = setup.clock.recv_timeout(&copy, COPY_WAIT) else { return };
+            patcher.flush();
+            let places: Vec<_> = mesh.touched().collect();
+            let known = places.iter().map(|&(vertex, ..)| mesh.variance(vertex).to_bits());
+            let variances = evaluated(&mut patcher, &setup.scan, &places).into_iter().zip(known);
+            let changed = variances.filter(|((_, variance), known)| variance.to_bits() != *known);
+            let changed = changed.map(|(variance, _)| variance).collect();
+            // its next version need not be a copy
+            drop(mesh);
+            // the node may have ended
+            let _ = to.send(changed);
+        };
+        if let Err(error) = self.side_work.begin("variance", work) {
+            warn!(%error, "no thread to evaluate variances on: mesh_patch has none until the mesh changes again");
+        }
+        self.variance.made = Some((state, made));
+    }
+
+    fn send_variances(&mut self, (session, version): State, of: Vec<VertexVariance>) {
+        if of.is_empty() {
+            self.variance.done = Some((session, version));
+            return;
+        }
+        let version = version + 1;
+        // a view that is behind gets them with the next evaluation
+        if self.view.try_send(ViewInput::Variances(Variances { version, of })).is_ok() {
+            (self.session.version, self.session.sent_version) = (version, version);
+            self.setup.shared.mesh.announce(version);
+            self.variance.done = Some((session, version));
+        }
+    }
+}
+
+/// Variances of vertices in their order; none where the scene asks for no uncertainty.
+fn evaluated(
+    patcher: &mut Patcher,
+    (scan, tree): &(TriMesh, FaceTree),
+    vertices: &[(u32, Point3<f64>, Support)],
+) -> Vec<VertexVariance> {
+    let places: Vec<_> = vertices.iter().map(|&(_, place, support)| (place, support)).collect();
+    let sigmas = patcher.sigma_at(scan, tree, &places);
+    vertices.iter().zip(sigmas).map(|(&(vertex, ..), sigma)| (vertex, (sigma * sigma) as f32)).collect()
+}
