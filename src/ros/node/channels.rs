@@ -7,7 +7,7 @@ use std::sync::mpsc::SyncSender;
 use nalgebra::Point3;
 
 use super::replica::{Edits, MeshVersion};
-use super::vertex_variance::Variances;
+use super::variances::Variances;
 use crate::features::Feature;
 use crate::live::TouchDelta;
 use crate::probing::execute::Flag;

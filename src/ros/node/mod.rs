@@ -30,6 +30,7 @@ mod take_out;
 mod taking_out;
 mod tiles;
 mod tip;
+mod variances;
 mod vertex_variance;
 mod view;
 

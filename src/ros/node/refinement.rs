@@ -24,7 +24,7 @@ use super::setup::Setup;
 use super::side_work::SideWork;
 use super::streams::StreamWatch;
 use super::take_out::TakingOut;
-use super::vertex_variance::VarianceWork;
+use super::variances::VarianceWork;
 use crate::haptic::RefineError;
 use crate::live::LiveError;
 use crate::ros::inbox::Arrivals;

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 
 use nalgebra::Point3;
 
-use super::vertex_variance::Variances;
+use super::variances::Variances;
 use crate::clock::{Clock, Working};
 use crate::live::{Engine, LiveError};
 use crate::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};

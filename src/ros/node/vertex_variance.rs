@@ -3,43 +3,19 @@
 //! The mesh with it is the next version, so that a follower takes it up as any other change; no vertex moves by it.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::mpsc::{TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-use nalgebra::Point3;
 use tracing::warn;
 
 use super::channels::ViewInput;
 use super::refinement::RefinementWorker;
-use crate::mesh::{FaceTree, TriMesh};
-use crate::reconstruct::{Patcher, Support};
+use super::variances::{VarianceState, Variances, VertexVariance, evaluated};
 
 /// Without a sample for so long the variance is evaluated: longer than the node takes to settle the mesh.
 const KNOWN_AFTER: Duration = Duration::from_millis(1000);
 /// How long the copies of mesh and evidence may take.
 const COPY_WAIT: Duration = Duration::from_secs(30);
-
-/// Number of a vertex, and its variance along the normal, m².
-pub type VertexVariance = (u32, f32);
-
-/// Variances of vertices, those that are others than before.
-#[derive(Debug)]
-pub struct Variances {
-    /// state of the mesh with these in it
-    pub version: u64,
-    /// …
-    pub of: Vec<VertexVariance>,
-}
-
-/// Session and version.
-type State = (String, u64);
-
-/// What is evaluated now, and what was.
-#[derive(Debug, Default)]
-pub(super) struct VarianceWork {
-    done: Option<State>,
-    made: Option<(State, Receiver<Vec<VertexVariance>>)>,
-}
 
 impl RefinementWorker {
     /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never waits.
@@ -59,7 +35,7 @@ impl RefinementWorker {
         }
     }
 
-    fn is_state(&self, (session, version): &State) -> bool {
+    fn is_state(&self, (session, version): &VarianceState) -> bool {
         session == self.session.folder.name() && *version == self.session.version
     }
 
@@ -76,7 +52,7 @@ impl RefinementWorker {
         self.endpoints.get(self.port.mesh_patch_topic()).is_some_and(|endpoint| endpoint.count > 0)
     }
 
-    fn begin_variances(&mut self, state: State) {
+    fn begin_variances(&mut self, state: VarianceState) {
         let Ok(Some(copy)) = self.session.engine.copy_patcher() else {
             // nothing was touched, or there is no patch
             self.variance.done = Some(state);
@@ -108,7 +84,7 @@ impl RefinementWorker {
         self.variance.made = Some((state, made));
     }
 
-    fn send_variances(&mut self, (session, version): State, of: Vec<VertexVariance>) {
+    fn send_variances(&mut self, (session, version): VarianceState, of: Vec<VertexVariance>) {
         if of.is_empty() {
             self.variance.done = Some((session, version));
             return;
@@ -121,15 +97,4 @@ impl RefinementWorker {
             self.variance.done = Some((session, version));
         }
     }
-}
-
-/// Variances of vertices in their order; none where the scene asks for no uncertainty.
-fn evaluated(
-    patcher: &mut Patcher,
-    (scan, tree): &(TriMesh, FaceTree),
-    vertices: &[(u32, Point3<f64>, Support)],
-) -> Vec<VertexVariance> {
-    let places: Vec<_> = vertices.iter().map(|&(_, place, support)| (place, support)).collect();
-    let sigmas = patcher.sigma_at(scan, tree, &places);
-    vertices.iter().zip(sigmas).map(|(&(vertex, ..), sigma)| (vertex, (sigma * sigma) as f32)).collect()
 }
