@@ -2,9 +2,13 @@
 
 use std::path::Path;
 
+use nalgebra::{Point3, Vector3};
+
 use super::InspectionError;
+use super::drawn_feature::{DrawnFeature, measured, shape_of};
 use super::source::inspected_file;
 use crate::conformity::{GeneralTolerance, InspectedQuantity, ToleranceLimits};
+use crate::features::{Feature, Measured};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::InspectedFile;
 use crate::io::mesh_file::MeshUnit;
@@ -37,6 +41,8 @@ pub struct Drawn {
 /// All characteristics of a part.
 pub struct PartDrawing {
     pub characteristics: Vec<Drawn>,
+    /// by whose places drawing and part are aligned
+    pub features: Vec<DrawnFeature>,
     pub file: InspectedFile,
     /// what was left out of it, in words
     pub notes: Vec<String>,
@@ -50,14 +56,16 @@ impl PartDrawing {
             let drawn = |record: NominalRecord| {
                 drawn(record, params).map_err(|why| InspectionError::Drawing { path: path.to_owned(), why })
             };
-            let characteristics = records.into_iter().map(drawn).collect::<Result<_, _>>()?;
-            return Ok(Self { characteristics, file: inspected_file("drawing", path)?, notes: Vec::new() });
+            let characteristics: Vec<_> = records.into_iter().map(drawn).collect::<Result<_, _>>()?;
+            let features = features_of_records(&characteristics);
+            return Ok(Self { characteristics, features, file: inspected_file("drawing", path)?, notes: Vec::new() });
         }
         let has_tolerance = params.general.is_some() || params.tolerance_mm.is_some();
         if !has_tolerance {
             return Err(InspectionError::NoTolerance);
         }
-        let records = of_features(&features_of_mesh(path, params)?.features, params);
+        let found = features_of_mesh(path, params)?.features;
+        let records = of_features(&found, params);
         let (mut characteristics, mut left) = (Vec::new(), Vec::new());
         for record in records {
             let name = record.name.clone();
@@ -71,8 +79,71 @@ impl PartDrawing {
         if !left.is_empty() {
             notes.push(format!("The general tolerance has no value for {}: not inspected.", left.join(", ")));
         }
-        Ok(Self { characteristics, file: inspected_file("drawing (CAD mesh)", path)?, notes })
+        let features = features_of_shapes(&found);
+        Ok(Self { characteristics, features, file: inspected_file("drawing (CAD mesh)", path)?, notes })
     }
+}
+
+/// The features that characteristics are about, and those that are datums alone.
+fn features_of_records(characteristics: &[Drawn]) -> Vec<DrawnFeature> {
+    let mut features: Vec<(NominalRecord, DrawnFeature)> = Vec::new();
+    for Drawn { nominal, quantity, .. } in characteristics {
+        let at = features.iter().position(|(first, _)| first.is_of_the_same_feature(nominal));
+        let at = at.unwrap_or_else(|| {
+            features.push((nominal.clone(), drawn_feature(nominal)));
+            features.len() - 1
+        });
+        let DrawnFeature { names, shape, .. } = &mut features[at].1;
+        names.push(nominal.name.clone());
+        let size = || Some(measured(nominal.nominal() * 1e-3, None));
+        match quantity {
+            InspectedQuantity::Diameter => shape.diameter = size(),
+            InspectedQuantity::Width => shape.width = size(),
+            _ => {}
+        }
+        if shape.axis.is_none() {
+            shape.axis = axis_of(nominal);
+        }
+    }
+    let datums = characteristics.iter().filter_map(|drawn| Some((&drawn.nominal.name, drawn.nominal.datum.as_ref()?)));
+    for (name, datum) in datums {
+        let (kind, center_mm, feature) = (datum.kind.clone(), datum.center_mm, datum.feature);
+        let record =
+            NominalRecord { name: format!("datum of {name}"), kind, center_mm, feature, ..NominalRecord::default() };
+        if !features.iter().any(|(first, _)| first.is_of_the_same_feature(&record)) {
+            let names = vec![record.name.clone()];
+            features.push((record.clone(), DrawnFeature { names, ..drawn_feature(&record) }));
+        }
+    }
+    features.into_iter().map(|(_, feature)| feature).collect()
+}
+
+fn drawn_feature(record: &NominalRecord) -> DrawnFeature {
+    let centre = record.center_mm.map_or_else(Point3::origin, |mm| Point3::from(mm) * 1e-3);
+    let shape = Feature {
+        kind: record.kind().unwrap_or_default(),
+        centre: measured(centre, None),
+        axis: axis_of(record),
+        ..Feature::default()
+    };
+    DrawnFeature { names: Vec::new(), id: record.feature, shape, has_place: record.center_mm.is_some() }
+}
+
+/// As a unit vector.
+fn axis_of(record: &NominalRecord) -> Option<Measured<Vector3<f64>>> {
+    Some(measured(Vector3::from(record.axis?).try_normalize(0.0)?, None))
+}
+
+/// Those of a CAD mesh, which are exact, by their kinds and numbers.
+fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
+    let mut counts = std::collections::BTreeMap::new();
+    let feature = |record: &FeatureRecord| {
+        let count = counts.entry(record.kind.clone()).or_insert(0);
+        *count += 1;
+        let names = vec![format!("{} {count}", record.kind)];
+        Some(DrawnFeature { names, id: None, shape: shape_of(record)?, has_place: true })
+    };
+    found.iter().filter_map(feature).collect()
 }
 
 /// A characteristic with its own limits, or those of the general tolerance.
@@ -128,6 +199,7 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<Nomina
         let base = NominalRecord {
             kind: kind.clone(),
             center_mm: feature.center_mm.map(|center| center.map(rounded)),
+            axis: feature.axis,
             ..NominalRecord::default()
         };
         let depth = feature.depth_mm.filter(|_| feature.through != Some(true) && feature.depth_is_at_least.is_none());

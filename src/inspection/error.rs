@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use super::alignment::AlignmentError;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
@@ -72,6 +73,9 @@ pub enum InspectionError {
     /// The CAD mesh of the drawing cannot be read.
     #[error("{}", .0.to_string().replace("--mesh-unit", "--nominal-unit"))]
     DrawingMesh(#[source] ScanError),
+    /// Drawing and part are not brought into one frame.
+    #[error(transparent)]
+    Alignment(#[from] AlignmentError),
     /// The mesh of the picture cannot be read.
     #[error(transparent)]
     Mesh(#[from] ScanError),

@@ -57,7 +57,7 @@ impl ReportFiles {
         };
         let html = self.html.as_ref().map(made).transpose()?;
         if let Some(path) = &self.csv {
-            write_inspection_table(path, &record.characteristics)?;
+            write_inspection_table(path, &record.characteristics, &record.frame())?;
         }
         if let Some(path) = &self.json {
             let mut text = serde_json::to_string(record).expect("finite numbers and names alone cannot fail");

@@ -3,8 +3,10 @@
 //! What was measured ([`InspectionSource`]) and what the part should be ([`PartDrawing`]) give the characteristics ([`inspected`]); the
 //! decisions themselves are those of [`crate::conformity`]. Command line and operator's page make the same report of the same files.
 
+mod alignment;
 mod calibration;
 mod drawing;
+mod drawn_feature;
 mod error;
 mod evidence;
 mod files;
@@ -15,6 +17,7 @@ mod rows;
 mod source;
 mod words;
 
+pub use self::alignment::AlignmentMethod;
 pub use self::drawing::{DrawingParams, PartDrawing, template};
 pub use self::error::InspectionError;
 pub use self::files::ReportFiles;

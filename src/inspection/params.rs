@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::InspectionError;
+use super::alignment::AlignmentMethod;
 use super::drawing::DrawingParams;
 use crate::conformity::DecisionParams;
 use crate::io::mesh_file::MeshUnit;
@@ -19,6 +20,8 @@ pub struct InspectionParams {
     /// A feature is the nominal one where its centre is no farther off than this across its axis, mm. Default 1.5: less than what
     /// separates neighbours on most parts.
     pub match_mm: f64,
+    /// how the frame of the drawing is found on the part; `None`: it is that of the mesh
+    pub align: Option<AlignmentMethod>,
     /// name or number of the part
     pub part: Option<String>,
     /// of this one part
@@ -43,6 +46,7 @@ impl Default for InspectionParams {
             decision: DecisionParams::default(),
             coverage_factor: 2.0,
             match_mm: 1.5,
+            align: None,
             part: None,
             serial: None,
             operator: None,

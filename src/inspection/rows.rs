@@ -6,14 +6,16 @@ use std::time::SystemTime;
 use chrono::{DateTime, SecondsFormat, Utc};
 use nalgebra::{Point3, Vector3};
 
-use super::InspectionParams;
+use super::alignment::{Alignment, aligned};
 use super::drawing::{Drawn, PartDrawing};
+use super::drawn_feature::kind_of;
 use super::measured::{CharacteristicMeasurement, measurement};
 use super::source::InspectionSource;
+use super::words::first_few;
+use super::{InspectionError, InspectionParams};
 use crate::conformity::{
     Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess, match_features,
 };
-use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
 use crate::io::machine::VERSION;
@@ -44,35 +46,51 @@ pub struct Inspected {
 }
 
 /// Inspects.
-pub fn inspected(source: &InspectionSource, drawing: &PartDrawing, params: &InspectionParams) -> Inspected {
+///
+/// # Errors
+/// [`InspectionError::Alignment`]
+pub fn inspected(
+    source: &InspectionSource,
+    drawing: &PartDrawing,
+    params: &InspectionParams,
+) -> Result<Inspected, InspectionError> {
     let drawn = &drawing.characteristics;
+    let align = |method| aligned(&drawing.features, &source.features, method, params.match_mm);
+    let alignment = params.align.as_ref().map(align).transpose()?;
+    let file = alignment.as_ref().map_or(&source.features, |alignment| &alignment.features);
     let groups = groups_of(drawn);
-    let found = match_all(drawn, &groups, &source.features, params.match_mm * 1e-3);
+    let found = match_all(drawn, &groups, file, params.match_mm * 1e-3);
     let mut balloons = Vec::new();
     let (mut characteristics, mut runs) =
         (vec![CharacteristicRecord::default(); drawn.len()], vec![Vec::new(); drawn.len()]);
     for (number, group) in (1..).zip(&groups) {
         let first = &drawn[group[0]].nominal;
         let matched = &found.features[number - 1];
+        // the picture is that of the mesh
         let feature = found_feature(matched, &source.features);
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
-            let (record, behind) =
-                characteristic(&drawn[at], place, matched, &found.datums[at], &source.features, params);
+            let (record, behind) = characteristic(&drawn[at], place, matched, &found.datums[at], file, params);
             (characteristics[at], runs[at]) = (record, behind);
         }
         balloons.push(Balloon {
             number,
             kind: first.kind.clone(),
-            place_mm: feature.and_then(|feature| feature.center_mm).or(first.center_mm),
+            place_mm: feature.and_then(|feature| feature.center_mm).or_else(|| in_mesh(first.center_mm?, &alignment)),
             feature: feature.map(|feature| feature.id),
             characteristics: group.clone(),
         });
     }
     let matched: BTreeSet<u32> = balloons.iter().filter_map(|balloon| balloon.feature).collect();
     let quantities = drawn.iter().map(|drawn| drawn.quantity).collect();
-    let record = record_of(source, drawing, params, characteristics, &matched);
-    Inspected { record, balloons, runs, quantities }
+    let record = record_of(source, drawing, params, (characteristics, alignment), &matched);
+    Ok(Inspected { record, balloons, runs, quantities })
+}
+
+/// A place of the drawing in the frame of the mesh, mm.
+fn in_mesh(mm: [f64; 3], alignment: &Option<Alignment>) -> Option<[f64; 3]> {
+    let Some(alignment) = alignment else { return Some(mm) };
+    Some((alignment.motion.inverse_transform_point(&point(mm)) * 1e3).coords.into())
 }
 
 /// Characteristics of the same feature of the drawing, in order of the first of each.
@@ -112,10 +130,6 @@ fn point(mm: [f64; 3]) -> Point3<f64> {
     Point3::from(mm) * 1e-3
 }
 
-fn kind_of(name: &str) -> Option<Kind> {
-    Kind::ALL.into_iter().find(|kind| kind.name() == name)
-}
-
 fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
     let size = feature.diameter_mm.or(feature.width_mm).map(|mm| mm * 1e-3);
     let axis = feature.axis.map(Vector3::from);
@@ -144,7 +158,7 @@ fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord) -> Strin
         }
         FeatureMatch::Missing => {
             format!(
-                "no {kind} was found{}: touch it, and check that drawing and mesh share one frame",
+                "no {kind} was found{}: touch it, and check that drawing and mesh share one frame (or use --align)",
                 place(nominal.center_mm)
             )
         }
@@ -243,9 +257,16 @@ fn record_of(
     source: &InspectionSource,
     drawing: &PartDrawing,
     params: &InspectionParams,
-    characteristics: Vec<CharacteristicRecord>,
+    (characteristics, alignment): (Vec<CharacteristicRecord>, Option<Alignment>),
     matched: &BTreeSet<u32>,
 ) -> InspectionRecord {
+    let unused = alignment.iter().filter(|alignment| !alignment.unused.is_empty()).map(|alignment| {
+        format!(
+            "Not used for the alignment, as they were not found or not touched: {}.",
+            first_few(&alignment.unused, ", ")
+        )
+    });
+    let notes = source.notes.iter().chain(&drawing.notes).cloned().chain(unused).collect();
     let count = |decision: Decision| characteristics.iter().filter(|one| one.decision == decision.name()).count();
     let counts: BTreeMap<_, _> =
         Decision::ALL.into_iter().map(|decision| (decision.name().to_owned(), count(decision))).collect();
@@ -269,8 +290,9 @@ fn record_of(
         verdict: verdict.name().to_owned(),
         counts,
         files: files.collect(),
+        alignment: alignment.map(|alignment| alignment.record),
         characteristics,
         without_characteristic: without,
-        notes: source.notes.iter().chain(&drawing.notes).cloned().collect(),
+        notes,
     }
 }

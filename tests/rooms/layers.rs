@@ -35,7 +35,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io scan replay"),
-    ("inspection", "numeric stylus mesh features conformity compare io scan scene session"),
+    ("inspection", "numeric stylus mesh features conformity align compare io scan scene session"),
     ("input_check", "stylus mesh diagnose threads scene replay"),
     (
         "report",

@@ -34,12 +34,62 @@ pub struct InspectionRecord {
     pub counts: BTreeMap<String, usize>,
     /// what it rests on
     pub files: Vec<InspectedFile>,
+    /// how drawing and part were brought into one frame; left out where both were taken to be in that of the mesh
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alignment: Option<AlignmentRecord>,
     /// in the order of the drawing
     pub characteristics: Vec<CharacteristicRecord>,
     /// measured holes, slots, pockets, bosses, cylinders and notches that no characteristic is about, by `id`
     pub without_characteristic: Vec<u32>,
     /// what else has to be known, a sentence each
     pub notes: Vec<String>,
+}
+
+/// The motion that takes the frame of the mesh into that of the drawing: x ↦ rotation · x + translation.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct AlignmentRecord {
+    /// `best-fit` or `datums`
+    pub method: String,
+    /// the features that it rests on, datums in their order
+    pub features: Vec<AlignedFeatureRecord>,
+    /// rows of its matrix
+    pub rotation: [[f64; 3]; 3],
+    /// the same as a vector: along the axis, as long as the angle
+    pub rotation_vector_deg: [f64; 3],
+    /// of the origin
+    pub translation_mm: [f64; 3],
+    /// middle of the features, in the frame of the drawing
+    pub center_mm: [f64; 3],
+    /// standard uncertainties of the shift there, in the frame of the drawing
+    pub translation_std_mm: [f64; 3],
+    /// … of the turn
+    pub rotation_std_deg: [f64; 3],
+    /// root mean square of `residual_mm`
+    pub residual_rms_mm: f64,
+    /// the largest
+    pub residual_max_mm: f64,
+}
+
+/// A feature that an alignment rests on.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct AlignedFeatureRecord {
+    /// of a characteristic of it in the drawing
+    pub name: String,
+    /// kind of the feature
+    pub kind: String,
+    /// `id` of the measured feature
+    pub feature: u32,
+    /// how far it is off its nominal place after the alignment: across its axis, of a plane along its normal
+    pub residual_mm: f64,
+}
+
+impl InspectionRecord {
+    /// What positions and coordinates are about: `mesh`, or the frame of the drawing.
+    pub fn frame(&self) -> String {
+        let Some(AlignmentRecord { method, features, .. }) = &self.alignment else { return "mesh".to_owned() };
+        let datums = features.iter().map(|feature| format!(" {}", feature.feature)).collect::<String>();
+        format!("drawing by {method}{}", if method == "datums" { datums } else { String::new() })
+    }
 }
 
 /// A file that an inspection rests on.
@@ -130,7 +180,7 @@ impl CharacteristicRecord {
         }
     }
 
-    fn fields(&self, units: &[&str]) -> Vec<String> {
+    fn fields(&self, units: &[&str], frame: &str) -> Vec<String> {
         let text = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
         let id = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
         let mut fields = vec![
@@ -152,20 +202,36 @@ impl CharacteristicRecord {
             self.touches.to_string(),
             self.fitted_to.clone(),
             self.reason.clone().unwrap_or_default(),
+            frame.to_owned(),
         ]);
         fields
     }
 }
 
 const BEFORE: [&str; 6] = ["number", "name", "kind", "feature", "datum", "quantity"];
-const BEHIND: [&str; 8] =
-    ["is_at_least", "tolerance_from", "decision", "conformance_probability", "risk", "touches", "fitted_to", "reason"];
+const BEHIND: [&str; 9] = [
+    "is_at_least",
+    "tolerance_from",
+    "decision",
+    "conformance_probability",
+    "risk",
+    "touches",
+    "fitted_to",
+    "reason",
+    "frame",
+];
 
 /// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where there is an angle.
 ///
+/// - `frame`: what positions and coordinates are about, in each line.
+///
 /// # Errors
 /// [`FileError::Write`].
-pub fn write_inspection_table(path: &Path, characteristics: &[CharacteristicRecord]) -> Result<(), FileError> {
+pub fn write_inspection_table(
+    path: &Path,
+    characteristics: &[CharacteristicRecord],
+    frame: &str,
+) -> Result<(), FileError> {
     let units: Vec<_> = ["mm", "deg"]
         .into_iter()
         .filter(|unit| *unit == "mm" || characteristics.iter().any(|one| one.unit() == *unit))
@@ -177,7 +243,7 @@ pub fn write_inspection_table(path: &Path, characteristics: &[CharacteristicReco
         writeln!(out, "{}", csv_line(header.iter().map(String::as_str)))?;
         characteristics
             .iter()
-            .try_for_each(|one| writeln!(out, "{}", csv_line(one.fields(&units).iter().map(String::as_str))))
+            .try_for_each(|one| writeln!(out, "{}", csv_line(one.fields(&units, frame).iter().map(String::as_str))))
     })
 }
 
@@ -208,7 +274,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         let lines = |characteristics: &[CharacteristicRecord]| {
-            write_inspection_table(&path, characteristics).unwrap();
+            write_inspection_table(&path, characteristics, "mesh").unwrap();
             std::fs::read_to_string(&path).unwrap()
         };
         let lengths = lines(&[record("a", "diameter_mm"), record("b", "depth_mm")]);

@@ -48,11 +48,21 @@ fn document(record: &InspectionRecord) -> String {
         _ => "UNKNOWN",
     };
     let confidence = record.confidence.to_string();
+    // rows of rotation and translation, mm
+    let motion = record.alignment.as_ref().map(|found| {
+        let rows = [0, 1, 2].map(|i| {
+            let [x, y, z] = found.rotation[i];
+            format!("{x} {y} {z} {}", found.translation_mm[i])
+        });
+        ("mesh_to_drawing", rows.join("; "))
+    });
     let told = |name: &'static str, text: &Option<String>| text.clone().map(|text| (name, text));
     let of_results = [
         told("operator", &record.operator),
         Some(("decision_rule", record.rule.clone())),
         Some(("confidence", confidence)),
+        Some(("frame", record.frame())),
+        motion,
     ];
     let of_component = attributes(told("part", &record.part));
     let serial = record

@@ -8,7 +8,7 @@ use crate::cli::pictures::view_from;
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
 use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
-use crate::inspection::{DrawingParams, InspectionParams, InspectionSource, ReportFiles};
+use crate::inspection::{AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles};
 use crate::io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
@@ -34,6 +34,10 @@ pub(in crate::cli) struct InspectArguments {
     /// A feature is the nominal one where its centre is no farther off than this across its axis, mm
     #[arg(long, value_name = "R", default_value_t = InspectionParams::default().match_mm)]
     pub match_mm: f64,
+    /// Brings drawing and part into one frame: best-fit, over all features that both have; or datums=NAME,NAME,NAME with names of
+    /// characteristics, primary to tertiary. Positions are then about the frame of the drawing
+    #[arg(long, value_name = "HOW")]
+    pub align: Option<AlignmentMethod>,
     /// Writes nominal values to be edited, CSV or JSON, from the CAD mesh of --nominal or else from FEATURES; inspects nothing
     #[arg(long, value_name = "FILE")]
     pub write_nominal: Option<PathBuf>,
@@ -117,6 +121,7 @@ impl InspectArguments {
             decision: DecisionParams { rule: self.rule, confidence: self.confidence },
             coverage_factor: self.k,
             match_mm: self.match_mm,
+            align: self.align.clone(),
             part: self.part.clone(),
             serial: self.serial.clone(),
             operator: self.operator.clone(),

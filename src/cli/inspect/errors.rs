@@ -18,6 +18,7 @@ impl From<InspectionError> for CliError {
             Why::File { .. } => "inspection",
             Why::Probed { .. } => "features",
             Why::OtherTouches { .. } => "touches",
+            Why::Alignment(_) => "alignment",
             Why::Drawing { .. } | Why::DrawingMesh(_) => "nominal",
         };
         Self::new((kind, 3), &error, Some(&error))

@@ -23,7 +23,7 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
         let nominal = arguments.nominal.as_deref().ok_or_else(|| CliError::usage("--nominal is missing"))?;
         PartDrawing::read(nominal, &params.drawing)?
     };
-    let inspected = inspected(&source, &drawing, &params);
+    let inspected = inspected(&source, &drawing, &params)?;
     write(arguments, &source, &inspected)?;
     print_report(arguments.json, &inspected.record, || summary::in_words(&inspected.record))?;
     Ok(summary::losses(&inspected.record))

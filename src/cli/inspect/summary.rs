@@ -3,7 +3,7 @@
 use crate::cli::{Losses, counted};
 use crate::conformity::Decision;
 use crate::inspection::{first_few, percent};
-use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
+use crate::io::inspection_file::{AlignmentRecord, CharacteristicRecord, InspectionRecord};
 
 /// The table that is printed.
 pub(super) fn in_words(record: &InspectionRecord) -> String {
@@ -25,6 +25,7 @@ pub(super) fn in_words(record: &InspectionRecord) -> String {
         let ids = without.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
         lines.push(format!("without a characteristic: {}: {ids}", counted(without.len(), "feature", "features")));
     }
+    lines.extend(record.alignment.iter().map(aligned));
     lines.extend(record.notes.iter().cloned());
     let count = |decision: Decision| record.counts.get(decision.name()).copied().unwrap_or(0);
     let [pass, undecided, fail] = Decision::ALL.map(count);
@@ -35,6 +36,20 @@ pub(super) fn in_words(record: &InspectionRecord) -> String {
         percent(record.confidence)
     ));
     lines.join("\n")
+}
+
+/// How drawing and part were brought into one frame.
+fn aligned(found: &AlignmentRecord) -> String {
+    let [turn, shift] =
+        [found.rotation_vector_deg, found.translation_mm].map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let names = found.features.iter().map(|one| one.name.clone()).collect::<Vec<_>>();
+    format!(
+        "aligned by {}: {}; turned by {turn:.4}°, shifted by {shift:.3} mm; residual {:.3} mm rms, {:.3} mm at most",
+        found.method,
+        first_few(&names, ", "),
+        found.residual_rms_mm,
+        found.residual_max_mm
+    )
 }
 
 fn row(one: &CharacteristicRecord, width: usize) -> String {

@@ -1,5 +1,6 @@
 //! The report: one file of HTML without scripts, which asks for nothing outside of it and prints on A4.
 
+mod alignment;
 mod decisions;
 mod html;
 mod input;
@@ -26,12 +27,13 @@ pub(super) fn page(input: &ReportInput<'_>) -> Result<String, InspectionError> {
     body += &sections::verdict(record);
     body += &picture::picture(input)?;
     body += &decisions::table(input.inspected);
+    body += &alignment::alignment(record);
     body += &sections::form_and_relations(input);
     body += &touches::touches(input);
     body += &sections::calibration(input.calibration);
     body += &rule::rule(record);
     body += &sections::files(record);
-    body += &sections::limits();
+    body += &sections::limits(record);
     Ok(format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
          <title>{}</title>\n<style>\n{}\n@page {{ @bottom-left {{ content: {} }} }}\n</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",

@@ -164,14 +164,22 @@ pub(super) fn files(record: &InspectionRecord) -> String {
     format!("<h2>Files</h2>\n{}{note}", table("files", &["What", "File", "Bytes", "CRC-32"], &rows))
 }
 
-pub(super) fn limits() -> String {
+pub(super) fn limits(record: &InspectionRecord) -> String {
+    let frames = match record.alignment {
+        Some(_) => {
+            "Errors of different features count as independent in the uncertainty of the alignment; what they have in common drops out of positions."
+        }
+        None => {
+            "Where drawing and mesh do not share one frame, positions and coordinates are wrong, and features are not found."
+        }
+    };
     let limits = [
         "An uncertainty holds when radius of the ball, stiffness, calibration, place of the scan and noise are as told when it was measured. A wrong value there \
          gives wrong measured values with a small uncertainty; <code>touchup doctor</code>, <code>disagree</code> and <code>check</code> find some of them.",
         "The uncertainty is that of the touches. Temperature of the part, deformation by clamping and by the force of the touch beyond the told stiffness are not in it.",
         "A probability of conformity takes nothing for granted but the measurement: what the process usually makes is not counted in.",
         "Form and relations are those of what was touched; of the rest nothing is said.",
-        "Where drawing and mesh do not share one frame, positions and coordinates are wrong, and features are not found.",
+        frames,
     ];
     let items: String = limits.map(|limit| format!("<li>{}</li>\n", limit.replace("  ", " "))).concat();
     format!("<h2>Limits</h2>\n<ul class=\"small\">\n{items}</ul>\n")

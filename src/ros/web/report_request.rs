@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::conformity::{DecisionRule, GeneralTolerance};
-use crate::inspection::InspectionParams;
+use crate::inspection::{AlignmentMethod, InspectionParams};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::nominal_file::is_nominal_file;
 use crate::io::session_folder::SessionFolder;
@@ -45,6 +45,7 @@ pub(super) struct ReportRequest {
     tolerance_mm: Option<f64>,
     position_mm: Option<f64>,
     match_mm: Option<f64>,
+    align: Option<String>,
     rule: Option<String>,
     confidence: Option<f64>,
     k: Option<f64>,
@@ -72,6 +73,7 @@ impl ReportRequest {
         params.decision.confidence = self.confidence.unwrap_or(params.decision.confidence);
         params.coverage_factor = self.k.unwrap_or(params.coverage_factor);
         params.match_mm = self.match_mm.unwrap_or(params.match_mm);
+        params.align = self.align.as_deref().map(align).transpose()?;
         params.part = text("part", &self.part)?;
         params.serial = text("serial", &self.serial)?;
         params.operator = text("operator", &self.operator)?;
@@ -121,6 +123,10 @@ fn rule(name: &str) -> Result<DecisionRule, String> {
     rule.ok_or_else(|| format!("rule: take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
 }
 
+fn align(how: &str) -> Result<AlignmentMethod, String> {
+    how.parse().map_err(|why| format!("align: {why}"))
+}
+
 /// A text of one line; none where there is nothing in it.
 fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
     let Some(text) = given.as_deref().map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
@@ -152,6 +158,7 @@ mod tests {
         for (field, value, words) in [
             ("general", "iso2768-x".into(), "iso2768-f, iso2768-m"),
             ("rule", "hope".into(), "iso14253"),
+            ("align", "icp".into(), "align: take best-fit, or datums="),
             ("confidence", 0.5.into(), "above 0.5 and below 1"),
             ("k", 0.0.into(), "--k 0 must be above 0"),
             ("tolerance_mm", serde_json::json!(-1.0), "--tolerance-mm -1 must be above 0"),

@@ -97,7 +97,7 @@ impl ReportWork {
             // where it lies now it will not be found again
             drawing.file.path = name_of(file.path());
         }
-        let inspected = inspected(&source, &drawing, &self.params);
+        let inspected = inspected(&source, &drawing, &self.params)?;
         files.write(&source, &inspected, &PartPicture { mesh_unit: self.mesh_unit, view: None })
     }
 

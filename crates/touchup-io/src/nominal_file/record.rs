@@ -42,6 +42,9 @@ pub struct NominalRecord {
     /// nominal centre of the feature, by which it is found
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center_mm: Option<[f64; 3]>,
+    /// nominal axis, of a plane its outward normal: by it and the centre drawing and part are aligned. Of any length
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
     /// its `id` in the file of features, in place of the centre
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feature: Option<u32>,
@@ -180,9 +183,12 @@ impl NominalRecord {
             ));
         }
         let numbers = of_mm.iter().chain(&of_deg).filter_map(|(_, number)| *number);
-        let places = [self.center_mm, self.datum.as_ref().and_then(|datum| datum.center_mm)];
+        let places = [self.center_mm, self.axis, self.datum.as_ref().and_then(|datum| datum.center_mm)];
         match numbers.chain(places.into_iter().flatten().flatten()).find(|number| !number.is_finite()) {
             Some(number) => Err(format!("{name}: {number} is no finite number")),
+            None if self.axis == Some([0.0; 3]) => {
+                Err(format!("{name}: axis_x, axis_y, axis_z are 0: leave them empty"))
+            }
             None => Ok(()),
         }
     }

@@ -10,7 +10,7 @@ use crate::file_error::{FileError, write_file};
 use crate::table::{Row, TableError, read_table};
 
 /// The columns, in any order; those without a value in any row may be left out.
-const COLUMNS: [&str; 20] = [
+const COLUMNS: [&str; 23] = [
     "name",
     "kind",
     "quantity",
@@ -25,6 +25,9 @@ const COLUMNS: [&str; 20] = [
     "center_x_mm",
     "center_y_mm",
     "center_z_mm",
+    "axis_x",
+    "axis_y",
+    "axis_z",
     "feature",
     "datum_kind",
     "datum_x_mm",
@@ -83,6 +86,7 @@ fn record_of(row: &Row) -> Result<NominalRecord, String> {
         lower_deviation_deg: number("lower_deviation_deg")?,
         upper_deviation_deg: number("upper_deviation_deg")?,
         center_mm: place(["center_x_mm", "center_y_mm", "center_z_mm"])?,
+        axis: place(["axis_x", "axis_y", "axis_z"])?,
         feature: whole("feature")?,
         datum,
     })
@@ -99,12 +103,13 @@ pub(super) fn write(path: &Path, records: &[NominalRecord], comment: &[&str]) ->
     })
 }
 
-fn fields_of(record: &NominalRecord) -> [String; 20] {
+fn fields_of(record: &NominalRecord) -> [String; 23] {
     let shown = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
     let place = |center: Option<[f64; 3]>| center.map_or_else(Default::default, |center| center.map(|x| x.to_string()));
     let whole = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
     let datum = record.datum.clone().unwrap_or_default();
     let [x, y, z] = place(record.center_mm);
+    let [a, b, c] = place(record.axis);
     let [u, v, w] = place(datum.center_mm);
     [
         // the reader of tables knows no commas within a value
@@ -122,6 +127,9 @@ fn fields_of(record: &NominalRecord) -> [String; 20] {
         x,
         y,
         z,
+        a,
+        b,
+        c,
         whole(record.feature),
         datum.kind,
         u,

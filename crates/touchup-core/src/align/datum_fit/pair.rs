@@ -1,0 +1,24 @@
+//! A feature of the drawing, and the measured one that it is.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::features::Kind;
+
+/// A feature that was measured, and as the drawing has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DatumPair {
+    /// of both
+    pub kind: Kind,
+    /// nominal centre, m, in the frame of the drawing
+    pub nominal: Point3<f64>,
+    /// nominal axis or outward normal, unit vector
+    pub nominal_axis: Option<Vector3<f64>>,
+    /// measured centre, m, in O
+    pub measured: Point3<f64>,
+    /// measured axis or outward normal, unit vector
+    pub measured_axis: Vector3<f64>,
+    /// standard uncertainty of the measured centre, root mean square distance across the axis, of a plane along its normal, m
+    pub place_std: f64,
+    /// … of the measured axis, rad; `None`: its direction is not used
+    pub axis_std: Option<f64>,
+}

@@ -1,0 +1,61 @@
+//! Features as shapes: of the drawing, by whose places the measured ones are found, and of files.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::features::{Feature, Kind, Measured};
+use crate::io::features_file::FeatureRecord;
+
+/// A feature of the drawing.
+#[derive(Clone, Debug)]
+pub struct DrawnFeature {
+    /// of its characteristics; of a CAD mesh its kind and a number
+    pub names: Vec<String>,
+    /// the number of the measured one, where the drawing has it
+    pub id: Option<u32>,
+    /// kind, centre, axis and sizes in the frame of the drawing
+    pub shape: Feature,
+    /// whether the drawing says where it is
+    pub has_place: bool,
+}
+
+impl DrawnFeature {
+    /// The first of its names.
+    pub fn name(&self) -> &str {
+        self.names.first().map_or("", String::as_str)
+    }
+
+    /// Diameter or width, m.
+    pub fn size(&self) -> Option<f64> {
+        Some(self.shape.diameter.as_ref().or(self.shape.width.as_ref())?.value)
+    }
+}
+
+/// A feature of a file as a shape: kind, place, axis and sizes with their uncertainties; `None` without a place.
+pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
+    let std = |name: &str, unit: f64| record.std.get(name).map(|std| std * unit);
+    let size = |value: Option<f64>, name: &str| Some(measured(value? * 1e-3, std(name, 1e-3)));
+    Some(Feature {
+        id: record.id,
+        kind: kind_of(&record.kind)?,
+        centre: measured(Point3::from(record.center_mm?) * 1e-3, std("center_mm", 1e-3)),
+        axis: record.axis.map(|axis| measured(Vector3::from(axis), std("axis_deg", 1f64.to_radians()))),
+        direction: record.direction.map(Vector3::from),
+        diameter: size(record.diameter_mm, "diameter_mm"),
+        length: size(record.length_mm, "length_mm"),
+        width: size(record.width_mm, "width_mm"),
+        depth: size(record.depth_mm, "depth_mm"),
+        through: record.through,
+        is_convex: record.convex,
+        ..Feature::default()
+    })
+}
+
+/// The kind of a name.
+pub(super) fn kind_of(name: &str) -> Option<Kind> {
+    Kind::ALL.into_iter().find(|kind| kind.name() == name)
+}
+
+/// A number or place with its standard uncertainty.
+pub(super) fn measured<T: Default>(value: T, std: Option<f64>) -> Measured<T> {
+    Measured { value, std, ..Measured::default() }
+}
