@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::InspectionError;
 use super::alignment::AlignmentMethod;
 use super::drawing::DrawingParams;
-use crate::conformity::DecisionParams;
+use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
 use crate::io::mesh_file::MeshUnit;
 
 /// Settings of an inspection.
@@ -79,4 +79,22 @@ impl InspectionParams {
         }
         Ok(())
     }
+}
+
+/// The general tolerance of a name.
+///
+/// # Errors
+/// In words: the names that there are.
+pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
+    let class = GeneralTolerance::ALL.into_iter().find(|class| class.name() == name);
+    class.ok_or_else(|| format!("take one of {}", GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")))
+}
+
+/// The decision rule of a name.
+///
+/// # Errors
+/// As [`general_tolerance`].
+pub fn decision_rule(name: &str) -> Result<DecisionRule, String> {
+    let rule = DecisionRule::ALL.into_iter().find(|rule| rule.name() == name);
+    rule.ok_or_else(|| format!("take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
 }

@@ -8,7 +8,9 @@ use crate::cli::pictures::view_from;
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
 use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
-use crate::inspection::{AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles};
+use crate::inspection::{
+    AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles, decision_rule, general_tolerance,
+};
 use crate::io::mesh_file::MeshUnit;
 
 #[derive(Debug, Args)]
@@ -23,7 +25,7 @@ pub(in crate::cli) struct InspectArguments {
     #[arg(long, value_name = "U", default_value = "mm")]
     pub nominal_unit: MeshUnit,
     /// General tolerance for sizes that have none of their own
-    #[arg(long, value_name = "CLASS", value_parser = general, conflicts_with = "tolerance_mm")]
+    #[arg(long, value_name = "CLASS", value_parser = general_tolerance, conflicts_with = "tolerance_mm")]
     pub general: Option<GeneralTolerance>,
     /// … or the same tolerance ± for all of them, mm
     #[arg(long, value_name = "T")]
@@ -54,7 +56,7 @@ pub(in crate::cli) struct InspectArguments {
     #[arg(long, value_name = "YAML")]
     pub scene: Option<PathBuf>,
     /// How it is decided: guard bands, or the measured value alone
-    #[arg(long, value_name = "RULE", value_parser = rule, default_value = DecisionParams::default().rule.name())]
+    #[arg(long, value_name = "RULE", value_parser = decision_rule, default_value = DecisionParams::default().rule.name())]
     pub rule: DecisionRule,
     /// Probability of conformity that a pass needs, and of nonconformity that a fail needs
     #[arg(long, value_name = "P", default_value_t = DecisionParams::default().confidence)]
@@ -139,17 +141,4 @@ impl InspectArguments {
         let named = [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()];
         Ok(InspectionSource::read(&self.features, named)?)
     }
-}
-
-fn general(name: &str) -> Result<GeneralTolerance, String> {
-    let names = || GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ");
-    GeneralTolerance::ALL
-        .into_iter()
-        .find(|class| class.name() == name)
-        .ok_or_else(|| format!("take one of {}", names()))
-}
-
-fn rule(name: &str) -> Result<DecisionRule, String> {
-    let names = || DecisionRule::ALL.map(DecisionRule::name).join(", ");
-    DecisionRule::ALL.into_iter().find(|rule| rule.name() == name).ok_or_else(|| format!("take one of {}", names()))
 }

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::conformity::{DecisionRule, GeneralTolerance};
-use crate::inspection::{AlignmentMethod, InspectionParams};
+use crate::inspection::{InspectionParams, decision_rule, general_tolerance};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::nominal_file::is_nominal_file;
 use crate::io::session_folder::SessionFolder;
@@ -64,16 +63,16 @@ impl ReportRequest {
     pub fn params(&self, unit: MeshUnit) -> Result<InspectionParams, String> {
         let mut params = InspectionParams::default();
         params.drawing.unit = self.unit.unwrap_or(unit);
-        params.drawing.general = self.general.as_deref().map(general).transpose()?;
+        params.drawing.general = read("general", self.general.as_deref(), general_tolerance)?;
         (params.drawing.tolerance_mm, params.drawing.position_mm) = (self.tolerance_mm, self.position_mm);
         if params.drawing.general.is_some() && params.drawing.tolerance_mm.is_some() {
             return Err("general and tolerance_mm exclude each other: leave one out".to_owned());
         }
-        params.decision.rule = self.rule.as_deref().map(rule).transpose()?.unwrap_or(params.decision.rule);
+        params.decision.rule = read("rule", self.rule.as_deref(), decision_rule)?.unwrap_or(params.decision.rule);
         params.decision.confidence = self.confidence.unwrap_or(params.decision.confidence);
         params.coverage_factor = self.k.unwrap_or(params.coverage_factor);
         params.match_mm = self.match_mm.unwrap_or(params.match_mm);
-        params.align = self.align.as_deref().map(align).transpose()?;
+        params.align = read("align", self.align.as_deref(), str::parse)?;
         params.part = text("part", &self.part)?;
         params.serial = text("serial", &self.serial)?;
         params.operator = text("operator", &self.operator)?;
@@ -112,19 +111,9 @@ impl ReportRequest {
     }
 }
 
-fn general(name: &str) -> Result<GeneralTolerance, String> {
-    let class = GeneralTolerance::ALL.into_iter().find(|class| class.name() == name);
-    class
-        .ok_or_else(|| format!("general: take one of {}", GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")))
-}
-
-fn rule(name: &str) -> Result<DecisionRule, String> {
-    let rule = DecisionRule::ALL.into_iter().find(|rule| rule.name() == name);
-    rule.ok_or_else(|| format!("rule: take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
-}
-
-fn align(how: &str) -> Result<AlignmentMethod, String> {
-    how.parse().map_err(|why| format!("align: {why}"))
+/// What a field says; an error names the field.
+fn read<T>(field: &str, text: Option<&str>, of: fn(&str) -> Result<T, String>) -> Result<Option<T>, String> {
+    text.map(of).transpose().map_err(|why| format!("{field}: {why}"))
 }
 
 /// A text of one line; none where there is nothing in it.
