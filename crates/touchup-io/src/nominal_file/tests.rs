@@ -102,7 +102,12 @@ fn what_is_written_is_read_again_as_table_and_as_json() {
     };
     let records = [
         NominalRecord { nominal_mm: Some(8.0), tolerance_mm: Some(0.1), ..record("bore < 9 & \"fit\"", "diameter_mm") },
-        NominalRecord { nominal_deg: Some(90.0), lower_deviation_deg: Some(-1.0), ..record("cone", "cone_angle_deg") },
+        NominalRecord {
+            nominal_deg: Some(90.0),
+            lower_deviation_deg: Some(-1.0),
+            axis: Some([0.0, -0.6, 0.8]),
+            ..record("cone", "cone_angle_deg")
+        },
         NominalRecord { upper_deviation_mm: Some(0.05), datum: Some(datum), ..record("square", "perpendicularity_mm") },
         NominalRecord { center_mm: None, feature: Some(3), nominal_mm: Some(1.0), ..record("by number", "depth_mm") },
     ];
