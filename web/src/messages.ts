@@ -17,7 +17,8 @@ export interface State {
   program: string;
   session: string;
   is_paused: boolean;
-  scan: { file: string; faces: number };
+  /** `is_size_confirmed`: an operator has just said on the page how large it is. */
+  scan: { file: string; faces: number; is_size_confirmed: boolean };
   /** Its file, where the node has one. */
   nominal_part: string | null;
   arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts"; stays_because?: string | null };

@@ -77,6 +77,8 @@ pub struct NodeFacts {
     pub scan: PathBuf,
     /// it, m in O, with the tree over its faces
     pub scan_mesh: Arc<(TriMesh, FaceTree)>,
+    /// whether an operator has just said on the page how large it is
+    pub is_size_confirmed: bool,
     /// where sessions lie, each in a folder of its own
     pub session_folder: PathBuf,
     /// the part as it should be, m in O; `None`: nobody said
@@ -169,7 +171,7 @@ impl WebServer {
             annotations: Annotations::new(&facts.session_folder),
             nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
             reports: Reports::new(facts.nominal_file, facts.mesh_unit),
-            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
+            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count(), is_size_confirmed: facts.is_size_confirmed },
             scan_mesh: facts.scan_mesh,
             session_folder: facts.session_folder,
             pages: AtomicUsize::new(0),

@@ -39,6 +39,8 @@ pub(super) struct Site {
 pub(super) struct ScanShown {
     pub file: String,
     pub faces: usize,
+    /// whether an operator has just said on the page how large it is
+    pub is_size_confirmed: bool,
 }
 
 #[derive(Debug, Serialize)]
