@@ -223,7 +223,7 @@ def test_a_follower_that_loses_messages_has_the_bytes_that_are_saved(demo_folder
             places = follower.vertices.values()
             touched[:] = [place[:3] for place in places if place[4] == 1]
             variances[:] = [place[3] for place in places if place[4] == 1]
-            return len(touched) > 100 and numpy.isfinite(variances).all()
+            return len(touched) > 1000 and numpy.isfinite(variances).all()
 
         node.wait_for(is_known)
         sigmas = saved.metadata["_ply_raw"]["vertex"]["data"]["sigma_mm"].ravel()
