@@ -146,7 +146,15 @@ fn beside_pages(faces: usize, turns: usize) {
             let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
             let (scan_mesh, mesh_unit) = (ready.scan_mesh(), ready.mesh_unit());
-            let facts = NodeFacts { scan, scan_mesh, session_folder, nominal: None, nominal_file: None, mesh_unit };
+            let facts = NodeFacts {
+                scan,
+                scan_mesh,
+                session_folder,
+                nominal: None,
+                nominal_file: None,
+                mesh_unit,
+                is_size_confirmed: true,
+            };
             let page = WebServer::open(&params, |_| ()).expect("a port is free");
             let port = page.serve_node(facts, inbox, ready.whole_mesh(), port).expect("the services have names");
             let address = page.url().trim_start_matches("http://").parse().expect("it is an address");

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
+use crate::calibration::CalibrationError;
 use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
@@ -265,6 +266,18 @@ impl From<PayloadProbeError> for CliError {
             }
             PayloadProbeError::Ended(ending) => Self::ended(ending),
             PayloadProbeError::TooFew { .. } => Self::arm(error),
+        }
+    }
+}
+
+impl From<CalibrationError> for CliError {
+    fn from(error: CalibrationError) -> Self {
+        match error {
+            CalibrationError::Replay(error) => error.into(),
+            CalibrationError::Setting(error) => error.into(),
+            CalibrationError::Table(error) => error.into(),
+            CalibrationError::PayloadOfArm(_) => Self::arm(error),
+            error => Self::new(("calibration", 3), error, None),
         }
     }
 }

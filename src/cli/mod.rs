@@ -6,6 +6,8 @@
 
 mod arm;
 mod arm_errors;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+mod begin;
 mod calibrate;
 mod check;
 mod compare;

@@ -2,22 +2,26 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 
 use super::arm::{connect_ur, ros2_control_arm};
+use super::begin::BeginError;
 use super::path_parameter::path;
-use super::signals::end_on_signals;
+use super::signals::SignalledNode;
 use super::told::{ToldBy, ToldNumbers};
 use super::web::WebFlags;
 use super::{CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive};
 use crate::clock::Clock;
 use crate::live::Quantiles;
+use crate::mesh::TriMesh;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
-use crate::ros::inbox::inbox;
+use crate::ros::inbox::{Arrivals, Inbox, inbox};
 use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
 use crate::ros::parameters::ParameterValue;
+use crate::ros::port::Port;
 use crate::scan::{Scan, read_scan};
 use crate::scene::Scene;
 
@@ -51,16 +55,11 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     if !config.unused.is_empty() {
         tracing::warn!("the parameter files name what this node does not have: {}", config.unused.join(", "));
     }
-    let (ready, opened) = arguments.web.prepared(arguments.web_scans.as_deref(), &mut config.parameters)?;
-    let (scan, faces) = ready.scan();
-    print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
-    print_result(&arguments.told(&config, &ready).to_string())?;
-    print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
-    let (inbox, arrivals) = inbox(INBOX, &Clock::system());
-    end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
-    let port = ros::start(&config, inbox.clone())?;
-    let (port, _page) = arguments.web.serve(opened, &ready, inbox, port)?;
-    let arm = arm_of(&config, ready.scene())?;
+    let signals = SignalledNode::listen().map_err(NodeError::NoThread)?;
+    let mut begin = |config: &NodeConfig| arguments.begin(config, &signals);
+    let (begun, opened) = arguments.web.begun(arguments.web_scans.as_deref(), &mut config, &mut begin)?;
+    let Begun { ready, nominal, inbox, arrivals, port, arm } = begun;
+    let (port, _page) = arguments.web.serve(opened, nominal, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, arm)?;
     let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
     print_result(&format!(
@@ -73,6 +72,16 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     Ok(losses(&report))
 }
 
+/// A node that has its network and its arm.
+struct Begun {
+    ready: Prepared,
+    nominal: Option<TriMesh>,
+    inbox: Inbox,
+    arrivals: Arrivals,
+    port: Arc<dyn Port>,
+    arm: Option<ArmOfNode>,
+}
+
 /// The arm that the parameter `robot` asks for, with its own place on the network.
 fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliError> {
     let robot = config.parameters.string("robot");
@@ -81,6 +90,9 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
     }
     let why = format!("robot:={robot} touches with a probe: say source:=probe as well");
     require(config.parameters.string("source") == "probe", why)?;
+    if scene.probing().is_none() {
+        return Err(NodeError::NoRobot.into());
+    }
     let kind = match robot {
         "sim" => {
             let part = config.parameters.string("sim_part");
@@ -96,6 +108,34 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 }
 
 impl NodeArguments {
+    /// All that may go wrong before a node is there, so that an operator can mend it and begin anew.
+    fn begin(&self, config: &NodeConfig, signals: &SignalledNode) -> Result<Begun, BeginError> {
+        let ready = Prepared::new(config.parameters.clone())?;
+        let (inbox, arrivals) = inbox(INBOX, &Clock::system());
+        signals.set(Some(inbox.clone()));
+        let begun = self.around(config, ready, inbox, arrivals);
+        // nobody waits for a node that is not there
+        Ok(begun.inspect_err(|_| signals.set(None))?)
+    }
+
+    /// The network and the arm of a node that is ready.
+    fn around(
+        &self,
+        config: &NodeConfig,
+        ready: Prepared,
+        inbox: Inbox,
+        arrivals: Arrivals,
+    ) -> Result<Begun, CliError> {
+        let (scan, faces) = ready.scan();
+        print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
+        print_result(&self.told(config, &ready).to_string())?;
+        print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
+        let nominal = self.web.nominal(ready.mesh_unit())?;
+        let port = ros::start(config, inbox.clone())?;
+        let arm = arm_of(config, ready.scene())?;
+        Ok(Begun { ready, nominal, inbox, arrivals, port, arm })
+    }
+
     /// What the mesh will depend on, and who told it.
     fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
         let is_set = config.parameters.double("tip_radius_mm") > 0.0;

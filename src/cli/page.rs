@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::path_parameter::path;
 use super::replay::play;
-use super::signals::end_on_signals;
+use super::signals::SignalledNode;
 use super::web::WebFlags;
 use super::{CliError, notify};
 use crate::clock::Clock;
@@ -32,9 +32,9 @@ pub(super) fn on_page(
     let ready = Prepared::new(parameters)?;
     let clock = Clock::system();
     let (inbox, arrivals) = inbox(INBOX, &clock);
-    end_on_signals(inbox.clone()).map_err(NodeError::NoThread)?;
+    SignalledNode::listen().map_err(NodeError::NoThread)?.set(Some(inbox.clone()));
     let (port, touching) = in_process::start_unread(inbox.clone(), &clock);
-    let (port, page) = web.serve(None, &ready, inbox, port)?;
+    let (port, page) = web.serve(None, web.nominal(ready.mesh_unit())?, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, None)?;
     notify("the touching begins when the page is open; Ctrl-C saves and ends it");
     let touch = move || {

@@ -16,10 +16,11 @@ use crate::ros;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::node::{CELL, as_pose, as_wrench};
 use crate::ros::parameters::ParameterValue;
+use crate::ros::playback::{PlayedTime, wrench_frame_id};
 use crate::ros::port::SamplePort;
 use crate::scene::Scene;
 use crate::stylus::MarkerFilter;
-use crate::stylus::{Message, SyncParams, WrenchFrame};
+use crate::stylus::{Message, SyncParams};
 
 /// Wait after discovery of the subscribers: whether they have discovered us in turn they do not announce.
 const DISCOVERY: Duration = Duration::from_secs(1);
@@ -29,8 +30,6 @@ const LOOK: Duration = Duration::from_millis(50);
 const REPORT_AFTER: Duration = Duration::from_secs(2);
 /// Longest transport time of the last message.
 const LINGER: Duration = Duration::from_millis(300);
-/// A pause in the recording is shortened to this.
-const LONGEST_REST_NS: i64 = 2_000_000_000;
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArguments {
@@ -117,10 +116,7 @@ pub(super) fn play(
     source: &str,
     port: &dyn SamplePort,
 ) -> Result<(Played, Replayed), CliError> {
-    let wrench_frame = match recording.wrench_frame {
-        WrenchFrame::Object => CELL.to_owned(),
-        WrenchFrame::Sensor => format!("{source}_sensor"),
-    };
+    let wrench_frame = wrench_frame_id(recording.wrench_frame, source);
     let (mut played, mut pace, began) = (Played::default(), ReplayPace::new(speed), Instant::now());
     let mut publish = |message: Message| {
         pace.wait_for(message.stamp_ns());
@@ -204,29 +200,18 @@ impl StampOrder {
 /// When what was measured at a stamp is due.
 struct ReplayPace {
     speed: f64,
-    /// time since the first message by the stamps, without pauses, ns
-    passed_ns: i64,
-    last_ns: Option<i64>,
+    time: PlayedTime,
     began: Instant,
 }
 
 impl ReplayPace {
     fn new(speed: f64) -> Self {
-        Self { speed, passed_ns: 0, last_ns: None, began: Instant::now() }
+        Self { speed, time: PlayedTime::default(), began: Instant::now() }
     }
 
     /// Time since the beginning at which it is due. A stamp that goes back is due at once.
     fn due(&mut self, stamp_ns: i64) -> Duration {
-        let last_ns = *self.last_ns.get_or_insert(stamp_ns);
-        let step_ns = stamp_ns.saturating_sub(last_ns);
-        if step_ns > 0 {
-            self.passed_ns = self.passed_ns.saturating_add(step_ns.min(LONGEST_REST_NS));
-        }
-        // a clock that was set back goes on from there
-        if !(-LONGEST_REST_NS..=0).contains(&step_ns) {
-            self.last_ns = Some(stamp_ns);
-        }
-        Duration::from_secs_f64(self.passed_ns as f64 * 1e-9 / self.speed)
+        Duration::from_secs_f64(self.time.at_ns(stamp_ns) as f64 * 1e-9 / self.speed)
     }
 
     fn wait_for(&mut self, stamp_ns: i64) {

@@ -5,6 +5,8 @@ use std::io;
 use std::process::exit;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use std::sync::{Mutex, PoisonError};
 use std::task::Poll;
 use std::thread::Builder;
 
@@ -36,22 +38,42 @@ pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + S
     Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
 }
 
-/// The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still retracts stop and
-/// stay; one more, or the second where no arm moves, waits for nothing.
+/// The node that signals end; while there is none, a signal ends the program at once.
 #[cfg(any(feature = "ros", feature = "r2r"))]
-pub(super) fn end_on_signals(inbox: Inbox) -> std::io::Result<()> {
-    on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()], move |count| {
-        if count == 1 {
-            notify("ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is");
-            // a node that has ended already needs none
-            inbox.put(Arrival::Shutdown);
-            return;
-        }
-        if !inbox.stops().interrupt() {
-            std::process::exit(1);
-        }
-        notify("the arm stops and stays where it is; one more signal ends the node at once");
-    })
+#[derive(Debug)]
+pub(super) struct SignalledNode(Arc<Mutex<Option<Inbox>>>);
+
+#[cfg(any(feature = "ros", feature = "r2r"))]
+impl SignalledNode {
+    /// Listens from now on. The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still
+    /// retracts stop and stay; one more, or the second where no arm moves, waits for nothing.
+    pub fn listen() -> io::Result<Self> {
+        let node = Arc::new(Mutex::new(None::<Inbox>));
+        let heard = Arc::clone(&node);
+        let kinds = [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()];
+        on_each_signal(&kinds, move |count| {
+            let inbox = heard.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let Some(inbox) = inbox else { exit(i32::from(INTERRUPTED.1)) };
+            if count == 1 {
+                notify(
+                    "ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is",
+                );
+                // a node that has ended already needs none
+                inbox.put(Arrival::Shutdown);
+                return;
+            }
+            if !inbox.stops().interrupt() {
+                exit(1);
+            }
+            notify("the arm stops and stays where it is; one more signal ends the node at once");
+        })?;
+        Ok(Self(node))
+    }
+
+    /// From now on it is this one.
+    pub fn set(&self, node: Option<Inbox>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = node;
+    }
 }
 
 /// Waits for any of them.

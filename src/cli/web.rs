@@ -7,11 +7,15 @@ use std::sync::Arc;
 use clap::Args;
 
 use super::CliError;
+use super::begin::BeginError;
 #[cfg(feature = "web")]
 use super::notify;
 use super::require;
 #[cfg(feature = "web")]
 use super::set_up::{set_up, set_up_on_page};
+use crate::io::mesh_file::MeshUnit;
+use crate::mesh::TriMesh;
+use crate::ros::arguments::NodeConfig;
 use crate::ros::inbox::Inbox;
 use crate::ros::node::Prepared;
 use crate::ros::parameters::Parameters;
@@ -88,35 +92,51 @@ impl WebFlags {
         Ok(scene.as_os_str().is_empty() || Scene::read(scene)?.scan_file(scene).is_none())
     }
 
-    /// A node that is ready to start: as the parameters have it, or of the page.
+    /// What `begin` makes of a configuration.
     #[cfg(not(feature = "web"))]
-    pub fn prepared(
+    pub fn begun<B>(
         &self,
         _: Option<&Path>,
-        parameters: &mut Parameters,
-    ) -> Result<(Prepared, Option<WebServer>), CliError> {
-        require(!self.needs_setup(parameters)?, NOT_BUILT)?;
-        Ok((Prepared::new(parameters.clone())?, None))
+        config: &mut NodeConfig,
+        begin: &mut dyn FnMut(&NodeConfig) -> Result<B, BeginError>,
+    ) -> Result<(B, Option<WebServer>), CliError> {
+        require(!self.needs_setup(&config.parameters)?, NOT_BUILT)?;
+        Ok((begin(config)?, None))
     }
 
-    /// A node that is ready to start: as the parameters have it, or where those name no scan, as it is set up on the page, which then is
-    /// served already.
+    /// What `begin` makes of a configuration, or where that names no scan, of what is set up on the page, which then is served already.
     ///
     /// - `scans`: where scans lie.
     #[cfg(feature = "web")]
-    pub fn prepared(
+    pub fn begun<B>(
         &self,
         scans: Option<&Path>,
-        parameters: &mut Parameters,
-    ) -> Result<(Prepared, Option<WebServer>), CliError> {
-        if !self.needs_setup(parameters)? {
+        config: &mut NodeConfig,
+        begin: &mut dyn FnMut(&NodeConfig) -> Result<B, BeginError>,
+    ) -> Result<(B, Option<WebServer>), CliError> {
+        if !self.needs_setup(&config.parameters)? {
             require(scans.is_none(), "--web-scans is for a node without a scan, and one is named")?;
-            return Ok((Prepared::new(parameters.clone())?, None));
+            return Ok((begin(config)?, None));
         }
-        let Some(server) = self.listening()? else { return Ok((Prepared::new(parameters.clone())?, None)) };
-        let setup = set_up(&server, scans.unwrap_or(Path::new(".")), parameters)?;
+        let Some(server) = self.listening()? else { return Ok((begin(config)?, None)) };
+        let setup = set_up(&server, scans.unwrap_or(Path::new(".")), &config.parameters)?;
         self.announce(&server);
-        Ok((set_up_on_page(&setup, parameters)?, Some(server)))
+        Ok((set_up_on_page(&setup, config, begin)?, Some(server)))
+    }
+
+    /// The nominal part, where one is named.
+    #[cfg(not(feature = "web"))]
+    pub fn nominal(&self, _: MeshUnit) -> Result<Option<TriMesh>, CliError> {
+        Ok(None)
+    }
+
+    /// The nominal part, where one is named.
+    ///
+    /// - `unit`: of its file.
+    #[cfg(feature = "web")]
+    pub fn nominal(&self, unit: MeshUnit) -> Result<Option<TriMesh>, CliError> {
+        let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, unit)).transpose();
+        Ok(nominal.map_err(CliError::truth)?.map(|scan| scan.mesh))
     }
 
     /// The port for the node: no page is wanted, or this program has none.
@@ -124,6 +144,7 @@ impl WebFlags {
     pub fn serve(
         &self,
         _: Option<WebServer>,
+        _: Option<TriMesh>,
         _: &Prepared,
         _: Inbox,
         network: Arc<dyn Port>,
@@ -139,12 +160,11 @@ impl WebFlags {
     pub fn serve(
         &self,
         opened: Option<WebServer>,
+        nominal: Option<TriMesh>,
         ready: &Prepared,
         inbox: Inbox,
         network: Arc<dyn Port>,
     ) -> Result<(Arc<dyn Port>, Option<WebServer>), CliError> {
-        let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, ready.mesh_unit()));
-        let nominal = nominal.transpose().map_err(CliError::truth)?.map(|scan| scan.mesh);
         let (server, was_open) = match opened {
             Some(server) => (server, true),
             None => match self.listening()? {
@@ -155,7 +175,16 @@ impl WebFlags {
         let scan = ready.scan().0.to_owned();
         let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
         let (nominal_file, mesh_unit) = (self.web_nominal.clone(), ready.mesh_unit());
-        let facts = NodeFacts { scan, scan_mesh: ready.scan_mesh(), session_folder, nominal, nominal_file, mesh_unit };
+        let facts = NodeFacts {
+            scan,
+            scan_mesh: ready.scan_mesh(),
+            // on the page, when it was set up
+            is_size_confirmed: was_open,
+            session_folder,
+            nominal,
+            nominal_file,
+            mesh_unit,
+        };
         let port = server.serve_node(facts, inbox, ready.whole_mesh(), network)?;
         if !was_open {
             self.announce(&server);

@@ -14,6 +14,7 @@ pub mod names;
 pub mod node;
 mod parameter_services;
 pub mod parameters;
+pub mod playback;
 pub mod port;
 #[cfg(feature = "r2r")]
 pub mod r2r;

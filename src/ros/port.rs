@@ -41,8 +41,19 @@ pub enum Arrival {
     Viewer,
     /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made; `None` where nothing was touched
     Evidence(Reply<Option<Receiver<Patcher>>>),
+    /// a session that is replayed is at its end, or begins again; answered when that is done
+    Replay(ReplayStep, Reply<Result<(), String>>),
     /// the process is asked to end
     Shutdown,
+}
+
+/// What is between the messages of a session that is replayed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReplayStep {
+    /// from the scan on, as if none had come
+    Again,
+    /// none comes any more
+    End,
 }
 
 /// A call of a service, with what answers it.

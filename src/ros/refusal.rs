@@ -51,6 +51,7 @@ impl Arrival {
             Self::Call(call) => call.refuse(code, why),
             Self::SetParameter(_, _, reply) => reply.send(Err(why.to_owned())),
             Self::Evidence(reply) => reply.send(None),
+            Self::Replay(_, reply) => reply.send(Err(why.to_owned())),
             _ => {}
         }
     }

@@ -4,39 +4,19 @@ import json
 
 import numpy
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import Writer
-from mcap_ros2.decoder import DecoderFactory
+from part_of_recording import copy_part, ns
 from ros_process import play
 from test_page import cookie_of, page_of, saved_at_rest
 from web_page import PageNode, Socket
 
 
-def ns(stamp):
-    return stamp["sec"] * 10**9 + stamp["nanosec"]
-
-
 def without(recording, touch, out):
     """Copies a recording without the wrenches from a touch's first sample until its last; how many those were."""
-    left_out = 0
-    with open(out, "wb") as file:
-        writer, channels = Writer(file), {}
-        writer.start(profile="ros2")
-        for part in sorted(recording.glob("*.mcap")):
-            reader = make_reader(part.open("rb"), decoder_factories=[DecoderFactory()])
-            for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
-                stamp = decoded.header.stamp
-                measured_ns = stamp.sec * 10**9 + stamp.nanosec
-                if channel.topic.endswith("/wrench") and ns(touch["touch"]) <= measured_ns < ns(touch["until"]):
-                    left_out += 1
-                    continue
-                if channel.topic not in channels:
-                    known = writer.register_schema(schema.name, schema.encoding, schema.data)
-                    channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, known)
-                times = message.log_time, message.data, message.publish_time, message.sequence
-                writer.add_message(channels[channel.topic], *times)
-        writer.finish()
-    return left_out
+
+    def is_kept(topic, stamp_ns):
+        return not (topic.endswith("/wrench") and ns(touch["touch"]) <= stamp_ns < ns(touch["until"]))
+
+    return copy_part(recording, out, is_kept)
 
 
 def on_screen(camera, points):

@@ -6,67 +6,18 @@ import json
 import os
 import re
 import shutil
-import time
 from urllib.parse import urlsplit
 
 import numpy
 import pytest
 import trimesh
 from browser import DESKTOP, PORTRAIT, wait_until
-from ros_domains import domains
-from ros_process import Process
-from running import DEADLINE_S
+from setup_node import SetupNode, check_looks, page_on
 from test_page import AXE
 from test_web import let_in
-from web_page import Socket, page_url
+from web_page import Socket
 
 LARGEST = 2 << 30
-
-
-class SetupNode(Process):
-    """`touchup node --web` to which nobody named a scan, with a folder of scans."""
-
-    def __init__(self, program, folder, *arguments):
-        self.scans, self.sessions = folder / "scans", folder / "sessions"
-        self.scans.mkdir(exist_ok=True)
-        web = ["--web", "127.0.0.1:0", "--web-scans", self.scans, *arguments]
-        ros = ["--ros-args", "-p", f"session_folder:={self.sessions}"]
-        super().__init__(program, "node", "--json", *web, *ros, domain=next(domains))
-        self.url = page_url(self)
-        self.wait_for(lambda: any("no scan is named" in line for line in self.err))
-
-    def ask(self, path, body=None, *, origin=True, cookie=None, **headers):
-        """GET, or POST of bytes or of an object as JSON; the status and the answer."""
-        place = urlsplit(self.url)
-        headers = {"Cookie": cookie} if cookie else {}
-        if origin:
-            headers["Origin"] = self.url if origin is True else origin
-        if body is not None and not isinstance(body, bytes):
-            body = json.dumps(body)
-        connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
-        connection.request("GET" if body is None else "POST", path, body, headers)
-        answer = connection.getresponse()
-        text = answer.read()
-        connection.close()
-        return answer.status, json.loads(text)
-
-    def state(self, **options):
-        status, found = self.ask("/api/setup", **options)
-        assert status == 200, found
-        return found
-
-    def read(self, **options):
-        """The setup when no scan is being read any more."""
-        until = time.monotonic() + DEADLINE_S
-        while (found := self.state(**options))["scan"]["state"] == "reading":
-            assert time.monotonic() < until
-            time.sleep(0.05)
-        return found
-
-    def choose(self, name):
-        status, found = self.ask("/api/setup/scan", {"file": name})
-        assert status == 200, found
-        return self.read()
 
 
 @pytest.fixture
@@ -198,7 +149,8 @@ def test_who_looks_sees_the_setup_and_changes_nothing(touchup_bin, demo_folder, 
     shutil.copy(demo_folder / "scan.ply", scans)
     with SetupNode(touchup_bin, tmp_path, "--web-links") as node:
         changes = [("upload?name=x.ply", b"ply"), ("scan", {"file": "scan.ply"}), ("unit", {"unit": "mm"})]
-        changes += [("tip", {"radius_mm": 1}), ("start", {})]
+        changes += [("tip", {"radius_mm": 1}), ("start", {}), ("file?name=x.mcap", b"x")]
+        changes += [("calibrate", {"what": "tip", "recording": "x.mcap"}), ("use", {"what": "tip"})]
         assert node.ask("/api/setup")[0] == 401
         for path, body in changes:
             assert node.ask(f"/api/setup/{path}", body)[0] == 401, path
@@ -251,17 +203,37 @@ def test_an_error_of_the_start_is_told_at_its_step_and_can_be_mended(empty, demo
     empty.wait_for(lambda: any("listens to" in line for line in empty.out))
 
 
+def test_what_is_wrong_around_a_node_is_told_on_the_page_and_a_signal_ends_it(touchup_bin, demo_folder, tmp_path):
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    shutil.copy(demo_folder / "scan.ply", scans)
+    with SetupNode(touchup_bin, tmp_path, ros=["-p", "source:=probe", "-p", "robot:=sim"]) as node:
+        node.choose("scan.ply")
+        node.ask("/api/setup/unit", {"unit": "mm"})
+        node.ask("/api/setup/tip", {"radius_mm": 1.5})
+        for _ in range(2):
+            assert node.ask("/api/setup/start", {})[1]["failure"] is None
+            node.wait_for(lambda: node.state()["stage"] == "choosing")
+            failure = node.state()["failure"]
+            assert failure["step"] == "start" and "`robot:` in the scene" in failure["why"], failure
+        # nothing is there that would have to be saved
+        assert node.end() == 130, node.text()
+
+
 def test_a_recording_of_the_folder_is_looked_at_as_doctor_does(empty, touchup, demo_folder):
     for name in ["scan.ply", "touch.mcap"]:
         shutil.copy(demo_folder / name, empty.scans)
-    assert [one["name"] for one in empty.state()["recordings"]] == ["touch.mcap"]
+    # a folder is one recording too
+    (empty.scans / "touches").mkdir()
+    shutil.copy(demo_folder / "touch.mcap", empty.scans / "touches")
+    assert sorted(one["name"] for one in empty.state()["recordings"]) == ["touch.mcap", "touches"]
     assert empty.ask("/api/setup/check", {"recording": "touch.mcap"})[0] == 409
     empty.choose("scan.ply")
     empty.ask("/api/setup/unit", {"unit": "mm"})
-    for radius, is_sound in [(1.5, True), (15, False)]:
+    for radius, is_sound, recording in [(1.5, True, "touch.mcap"), (15, False, "touches")]:
         assert empty.ask("/api/setup/tip", {"radius_mm": radius})[0] == 200
         assert empty.state()["check"] == {"state": "none"}
-        assert empty.ask("/api/setup/check", {"recording": "touch.mcap"})[0] == 200
+        assert empty.ask("/api/setup/check", {"recording": recording})[0] == 200
         empty.wait_for(lambda: empty.state()["check"]["state"] != "running")
         found = empty.state()["check"]
         said = touchup("doctor", demo_folder / "scan.ply", demo_folder / "touch.mcap", "--tip-radius-mm", radius, "--json")
@@ -276,30 +248,6 @@ def test_a_recording_of_the_folder_is_looked_at_as_doctor_does(empty, touchup, d
     # nobody has to look
     assert empty.ask("/api/setup/check", {})[1]["is_check_over"]
     assert empty.ask("/api/setup/start", {})[0] == 200
-
-
-def page_on(browser, url, size, language="en", **options):
-    width, height = size
-    context = browser.new_context(viewport={"width": width, "height": height}, locale=language, **options)
-    page = context.new_page()
-    page.set_default_timeout(60_000)
-    page.wrong = []
-    page.on("pageerror", lambda error: page.wrong.append(str(error)))
-    page.goto(url)
-    page.get_by_role("heading", level=2).first.wait_for()
-    return page
-
-
-def check_looks(page, tmp_path, name):
-    """A picture, and what axe-core finds in it; nothing is wider than the window, and buttons are large enough for a finger."""
-    page.screenshot(path=tmp_path / f"{name}.png")
-    page.add_script_tag(path=AXE)
-    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
-    serious = [(one["id"], one["nodes"][0]["html"]) for one in found if one["impact"] in ("serious", "critical")]
-    assert serious == [], (name, serious)
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
-    heights = page.evaluate("[...document.querySelectorAll('button')].filter((one) => one.offsetParent).map((one) => one.offsetHeight)")
-    assert min(heights) >= 44, name
 
 
 @pytest.mark.parametrize(
@@ -358,6 +306,9 @@ def test_by_clicks_from_nothing_to_the_live_page(browser, touchup_bin, demo_fold
             wait_until(each, "window.touchup !== undefined && touchup.faceCount() > 0")
             assert each.wrong == []
         page.evaluate("touchup.idle()")
+        # how large it is has just been said
+        asked = page.locator(".setup .question").inner_text()
+        assert asked == {"en": "Switch the stylus on. Do place and force come in?", "de": "Schalten Sie den Taster ein. Kommen Lage und Kraft an?"}[language]
         page.screenshot(path=tmp_path / "live.png")
         page.context.close()
         other.context.close()

@@ -56,9 +56,9 @@ def page_url(process):
 class Socket:
     """A page's socket: the mesh as a follower has it, the newest of each topic, and answers."""
 
-    def __init__(self, url, origin=None, cookie=None, **options):
+    def __init__(self, url, origin=None, cookie=None, path="/ws", **options):
         headers = {"Cookie": cookie} if cookie else {}
-        address = re.sub("^http", "ws", url) + "/ws"
+        address = re.sub("^http", "ws", url) + path
         options = {"origin": origin or url, "subprotocols": [PROTOCOL], "max_size": None, "ping_interval": None, **options}
         self.opened = contextlib.ExitStack()
         self.socket = self.opened.enter_context(connect(address, additional_headers=headers, compression=None, **options))

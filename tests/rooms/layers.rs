@@ -36,6 +36,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("replay", "numeric stylus io scene"),
     ("session", "clock numeric stylus mesh reconstruct haptic live features io scan replay"),
     ("inspection", "numeric stylus mesh features conformity compare io scan scene session"),
+    ("calibration", "stylus align calibrate execute io scene replay"),
     ("input_check", "stylus mesh diagnose threads scene replay"),
     (
         "report",
@@ -45,13 +46,14 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scan scene session replay conformity inspection input_check",
+         calibrate compare diagnose io scan scene session replay conformity inspection input_check calibration",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay inspection input_check ros ros2_control ur",
+         calibrate compare diagnose io threads scan scene session replay inspection input_check calibration ros \
+         ros2_control ur",
     ),
 ];
 

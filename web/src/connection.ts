@@ -13,7 +13,7 @@ export const WAITS = [1000, 2000, 4000, 8000];
 /** A call that is not answered for so long has failed, ms. */
 const ANSWER_WITHIN = 15_000;
 
-export type LineState = { kind: "connecting" } | { kind: "connected" } | { kind: "waiting"; seconds: number };
+export type LineState = { kind: "connecting" } | { kind: "connected" } | { kind: "waiting"; seconds: number } | { kind: "ended" };
 
 /** Why a call failed; `sentence` is the node's own, null where it gave none. */
 export class CallError extends Error {
@@ -76,6 +76,13 @@ export class Connection {
   /** Begin again with a new line, which brings the whole mesh. */
   renew(): void {
     this.lost();
+  }
+
+  /** Gives the line up for good. */
+  end(): void {
+    clearInterval(this.countdown);
+    this.drop();
+    this.change({ kind: "ended" });
   }
 
   /** @param within ms; motions of an arm take minutes. */

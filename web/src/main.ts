@@ -4,20 +4,21 @@ import "./style.css";
 import { Connection } from "./connection";
 import { t } from "./language";
 import { buildPage } from "./page";
+import { replayedIn, socketAddress } from "./replay_place";
 import { followTheme } from "./settings_menu";
 import { buildSetupPage } from "./setup_page";
 import { askSetup } from "./setup_state";
 
-const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`;
+const replayed = replayedIn(location.search);
 void begin();
 
 async function begin(): Promise<void> {
   followTheme();
   const setup = await askSetup();
   if (setup !== null && setup !== "running") return buildSetupPage(setup);
-  const connection = new Connection(address);
+  const connection = new Connection(socketAddress(location, replayed));
   try {
-    buildPage(connection);
+    buildPage(connection, replayed);
     connection.connect();
   } catch (error) {
     // most likely no WebGL: without it there is nothing to see

@@ -17,7 +17,8 @@ export interface State {
   program: string;
   session: string;
   is_paused: boolean;
-  scan: { file: string; faces: number };
+  /** `is_size_confirmed`: an operator has just said on the page how large it is. */
+  scan: { file: string; faces: number; is_size_confirmed: boolean };
   /** Its file, where the node has one. */
   nominal_part: string | null;
   arm: null | { may_move: boolean; motion: "rests" | "moves" | "retracts"; stays_because?: string | null };
@@ -169,6 +170,25 @@ export interface Session {
   begun?: string;
 }
 
+/** Topic `replay`: how far the replay of a session is. Times are those along the recording without its long pauses, s. */
+export interface ReplayState {
+  session: string;
+  /** Before that it is being read. */
+  is_ready: boolean;
+  speed: number;
+  is_paused: boolean;
+  at_s: number;
+  end_s: number;
+  /** Where it runs ahead to; null: it plays. */
+  target_s: number | null;
+  is_at_end: boolean;
+  /** Touches that were taken out in the session. */
+  left_out: number;
+  damage: string | null;
+  /** Why there is none, or it does not go on. */
+  error: string | null;
+}
+
 /** Message of each topic. */
 export interface Topics {
   state: State;
@@ -180,6 +200,7 @@ export interface Topics {
   path: { poses: Array<{ pose: { position: Xyz } }> };
   probe_results: ProbeResult;
   probe_touches: ProbeTouch;
+  replay: ReplayState;
 }
 
 export type TopicName = keyof Topics;

@@ -28,7 +28,11 @@ export class Model {
   private annotations: Record<string, Annotation> = {};
   private readonly listeners: Array<[Part[], () => void]> = [];
 
-  constructor(connection: Connection) {
+  /** @param replayed name of the session that is replayed here; null: the page shows the one that runs. */
+  constructor(
+    connection: Connection,
+    readonly replayed: string | null = null,
+  ) {
     connection.onState((line) => this.set("line", () => (this.line = line)));
     connection.on("state", (state) => this.set("state", () => this.takeState(state)));
     connection.on("features", (message) =>

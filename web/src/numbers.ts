@@ -70,10 +70,20 @@ function withU(value: Num, std: Num, factor: number, unit: string, isAtLeast: bo
   return `${sign}${decimal(value * factor, decimals)}\u00a0±\u00a0${decimal(up, decimals)}${space}${unit}`;
 }
 
+/** "12.31 ± 0.04 N": a value and its standard uncertainty, both in that unit. */
+export function measured(value: number, std: number, unit: string): string {
+  return withU(value, std, 1, unit, false) ?? "";
+}
+
+/** "0.025": an expanded uncertainty, whatever its unit. */
+export function roundedUncertainty(u: number): string {
+  const decimals = decimalsOf(u);
+  return decimal(roundedUp(u, decimals), decimals);
+}
+
 /** "± 0.025 mm", from m. */
 export function uncertainty(u: number): string {
-  const decimals = decimalsOf(u * 1e3);
-  return `±\u00a0${decimal(roundedUp(u * 1e3, decimals), decimals)}\u00a0mm`;
+  return `±\u00a0${roundedUncertainty(u * 1e3)}\u00a0mm`;
 }
 
 /** "1.2 N" */

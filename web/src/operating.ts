@@ -44,6 +44,7 @@ export class Operating {
   /** Why nothing can be operated here; null when it can. */
   reason(): string | null {
     if (!this.model.isConnected) return t("whyNoLine");
+    if (this.model.replayed !== null) return t("whyReplay");
     return this.model.mayOperate ? null : t("whyLookOnly");
   }
 

@@ -19,6 +19,7 @@ import { Notices } from "./notices";
 import { decimal, percent } from "./numbers";
 import { Operating } from "./operating";
 import { Picture } from "./picture";
+import { Replay } from "./replay";
 import { Sessions } from "./sessions";
 import { settings } from "./settings";
 import { Setup } from "./setup";
@@ -35,9 +36,10 @@ const CALM = 200;
 /** Farther from a feature than this nobody who holds the tip asks for it, m. */
 const NEAR = 0.05;
 
-export function buildPage(connection: Connection): void {
+/** @param replayed name of the session that is replayed; null: the page shows the one that runs. */
+export function buildPage(connection: Connection, replayed: string | null): void {
   const store = new MeshStore();
-  const model = new Model(connection);
+  const model = new Model(connection, replayed);
   const notices = new Notices();
   const operating = new Operating(connection, model, notices);
   const takeOut = new TakeOut(model, operating, (contacts) => picture.showTouch(contacts));
@@ -46,7 +48,8 @@ export function buildPage(connection: Connection): void {
     onSelect: (id) => model.select(model.selected === id ? null : id),
     onTap: (hit, x, y) => {
       flagMenu.close();
-      if (hit === null) return model.select(null);
+      // in a replay there is nothing to be done with a place
+      if (hit === null || replayed !== null) return model.select(null);
       picture.showMark(hit.point);
       flagMenu.open(hit.point, isTouched(store, hit.face), x, y);
     },
@@ -93,13 +96,25 @@ export function buildPage(connection: Connection): void {
     panel.removeAttribute("title");
     const main = el("main", { class: "main" }, picture.element, controls.element);
     document.body.append(status.element, status.remedy, el("div", { class: "work" }, main, panel), sessions.element, sessions.report.element, share.element);
+    if (replayed !== null) layOutReplay(replayed);
+  }
+
+  /** What acts on a session that runs goes, and what acts on the replay takes its place. */
+  function layOutReplay(session: string): void {
+    const onReading = (): void => write(loading, t("replayReading"));
+    const replay = new Replay(connection, session, notices, onReading, () => (loading.hidden = true));
+    document.body.classList.add("replaying");
+    for (const each of [setup.element, guidance.element, arm.element, flagMenu.element, share.element]) each.remove();
+    status.element.after(replay.banner);
+    controls.element.replaceWith(replay.controls);
   }
 
   /** Says why the buttons rest. */
   function whyNot(): HTMLElement {
     const note = el("p", { class: "card note", attributes: { role: "status" } });
     const show = (): void => {
-      const reason = model.state === null ? null : operating.reason();
+      // the banner of a replay says why already
+      const reason = model.state === null || (replayed !== null && model.isConnected) ? null : operating.reason();
       note.hidden = reason === null;
       write(note, reason ?? "");
     };
@@ -137,7 +152,8 @@ export function buildPage(connection: Connection): void {
 
   function listenToMesh(): void {
     feedMesh(connection, store, {
-      onOther: () => picture.camera.forget(),
+      // a replay that begins again is seen from where it was
+      onOther: () => replayed === null && picture.camera.forget(),
       onGap: () => notices.bad(t("failedMesh")),
       onChange: () => {
         loading.hidden = store.version > 0;

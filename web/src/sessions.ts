@@ -1,11 +1,12 @@
 /** The sessions that are kept beside the node, with their files to take away. */
-import { button, el } from "./dom";
+import { button, el, picture } from "./dom";
 import { locale, t } from "./language";
 import type { Session } from "./messages";
 import type { Model } from "./model";
 import type { Notices } from "./notices";
 import { bytes } from "./numbers";
 import type { Operating } from "./operating";
+import { replayAddress } from "./replay_place";
 import { Report } from "./report";
 import { fileAddress } from "./report_summary";
 
@@ -65,7 +66,8 @@ export class Sessions {
     const hasReport = session.files.includes("report.html");
     const report = button("report", "report", () => void this.report.show(session));
     report.hidden = !hasReport && !this.model.mayOperate;
-    return entry(session, report);
+    const replay = el("a", { class: "button", attributes: { href: replayAddress(session.name) } }, picture("play"), el("span", { text: "replay" }));
+    return entry(session, replay, report);
   }
 }
 

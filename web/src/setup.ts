@@ -24,6 +24,7 @@ export class Setup {
   private readonly question = el("p", { class: "question" });
   private readonly reading = el("p", { class: "reading", attributes: { "aria-live": "off" } });
   private readonly remedy = el("p", { class: "fix", attributes: { hidden: "", role: "status" } });
+  private steps: readonly Step[] = STEPS;
   private at = 0;
   private isOpen = false;
 
@@ -51,10 +52,11 @@ export class Setup {
 
   /** Opens by itself for a scan that nobody has looked at on this device. */
   meshCame(): void {
-    if (!this.isOpen && this.scan !== null && settings.checkedScan !== this.scan && this.model.mayOperate) this.open();
+    if (!this.isOpen && this.scan !== null && settings.checkedScan !== this.scan && this.model.mayOperate) this.open(this.unasked);
   }
 
-  open(): void {
+  open(steps: readonly Step[] = STEPS): void {
+    this.steps = steps;
     this.at = 0;
     this.isOpen = true;
     this.element.hidden = false;
@@ -72,11 +74,17 @@ export class Setup {
   }
 
   private get step(): Step {
-    return STEPS[this.at];
+    return this.steps[this.at];
+  }
+
+  /** What nobody has asked yet: before there was a node, the size was. */
+  private get unasked(): readonly Step[] {
+    const isSizeSaid = this.model.state?.scan.is_size_confirmed === true;
+    return STEPS.filter((step) => step !== "size" || !isSizeSaid);
   }
 
   private show(): void {
-    write(this.count, t("checkStep", { step: this.at + 1, all: STEPS.length }));
+    write(this.count, t("checkStep", { step: this.at + 1, all: this.steps.length }));
     if (this.step === "size") write(this.question, this.sizeQuestion());
     else say(this.question, QUESTIONS[this.step]);
     this.remedy.hidden = true;
@@ -106,7 +114,7 @@ export class Setup {
 
   private next(): void {
     this.at++;
-    if (this.at < STEPS.length) this.show();
+    if (this.at < this.steps.length) this.show();
     else this.finish();
   }
 

@@ -1,23 +1,16 @@
-/**
- * The fourth step: which calibrations the scene has, with what it costs to do without and how each is done; and what a recording of the
- * folder says of scan, tip and sensors.
- */
+/** The fourth step: the calibrations of the scene, and what a recording of touches says of scan, tip and sensors. */
 import { button, el, say, write } from "./dom";
 import { t } from "./language";
+import { CalibrationCard } from "./setup_calibration";
 import { type CheckFinding, changeSetup, type SetupFile, type SetupState } from "./setup_state";
 import { type SetupDesk, SetupStep } from "./setup_step";
 import type { TextKey } from "./texts";
 
-type Calibration = keyof SetupState["calibrations"];
-
-const CALIBRATIONS: Record<Calibration, { title: TextKey; cost: TextKey; how: TextKey; command: string }> = {
-  tip: { title: "calibrationTip", cost: "calibrationTipCost", how: "calibrationTipHow", command: "touchup calibrate tip" },
-  payload: { title: "calibrationPayload", cost: "calibrationPayloadCost", how: "calibrationPayloadHow", command: "touchup calibrate payload" },
-  scan: { title: "calibrationScan", cost: "calibrationScanCost", how: "calibrationScanHow", command: "touchup calibrate scan" },
-};
+/** In the order in which they are made. */
+const CALIBRATIONS = ["tip", "payload", "scan"] as const;
 
 export class CheckStep extends SetupStep {
-  private readonly calibrations = el("ul", { class: "choices-list" });
+  private readonly calibrations: CalibrationCard[];
   private readonly question = el("p", { class: "question" });
   private readonly recordings = el("div", { class: "choices-list" });
   private readonly status = el("p", { attributes: { role: "status" } });
@@ -30,9 +23,10 @@ export class CheckStep extends SetupStep {
     super("check", 4, "checkTitle", desk);
     this.over = button("accept", "checkOver", () => void desk.attempt(this, () => changeSetup("check", {})), "primary");
     this.over.querySelector("span")?.replaceWith(this.overWords);
+    this.calibrations = CALIBRATIONS.map((name) => new CalibrationCard(name, this, desk));
     this.body.append(
       el("p", { class: "muted", text: "checkScene" }),
-      this.calibrations,
+      el("ul", { class: "choices-list" }, ...this.calibrations.map(({ element }) => element)),
       this.question,
       this.recordings,
       this.status,
@@ -52,8 +46,10 @@ export class CheckStep extends SetupStep {
     return t("findingCount", { file: check.file, wrong, doubtful: check.findings.length - wrong });
   }
 
-  protected draw({ calibrations, recordings, check, folder }: SetupState): void {
-    const isRunning = check.state === "running";
+  protected draw(state: SetupState): void {
+    const { recordings, calibration, check, folder } = state;
+    for (const each of this.calibrations) each.show(state);
+    const isRunning = check.state === "running" || calibration.state === "running";
     const mayChange = this.desk.mayChange && !isRunning;
     write(this.question, recordings.length > 0 ? t("recordingQuestion") : t("recordingNone", { folder }));
     this.status.classList.toggle("fix", check.state === "refused");
@@ -63,10 +59,9 @@ export class CheckStep extends SetupStep {
     say(this.overWords, check.state === "found" ? "checkOver" : "checkWithout");
     this.over.disabled = !mayChange;
     // the same again touches nothing, so that who is on a button stays there
-    const drawn = JSON.stringify([calibrations, recordings, check, t("checkTitle")]);
+    const drawn = JSON.stringify([recordings, check, t("checkTitle")]);
     if (drawn !== this.drawn) {
       this.drawn = drawn;
-      this.calibrations.replaceChildren(...(Object.keys(CALIBRATIONS) as Calibration[]).map((name) => calibration(name, calibrations[name])));
       this.recordings.replaceChildren(...recordings.map((file) => this.entry(file)));
       this.findings.replaceChildren(...(check.state === "found" ? findingLines(check) : []));
     }
@@ -83,17 +78,6 @@ export class CheckStep extends SetupStep {
     made.addEventListener("click", () => void this.desk.attempt(this, () => changeSetup("check", { recording: name })));
     return made;
   }
-}
-
-/** What is there in one line; what is not with its cost, and behind a line how it is done. */
-function calibration(name: Calibration, isThere: boolean): HTMLElement {
-  const { title, cost, how, command } = CALIBRATIONS[name];
-  const pill = el("span", { class: "pill", text: isThere ? "calibrationThere" : "calibrationMissing" });
-  pill.dataset.level = isThere ? "good" : "warn";
-  const head = el("span", { class: "row start" }, el("strong", { text: title }), pill);
-  if (isThere) return el("li", { class: "calibration" }, head);
-  const steps = el("ol", {}, el("li", { text: how }), el("li", {}, t("calibrationRun", { command })));
-  return el("li", { class: "calibration" }, el("details", {}, el("summary", {}, head, el("span", { class: "muted", text: cost })), steps));
 }
 
 function findingLines({ file, findings, losses }: { file: string; findings: CheckFinding[]; losses: string[] }): HTMLElement[] {

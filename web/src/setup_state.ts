@@ -51,6 +51,59 @@ export type CheckChoice =
   | { state: "refused"; file: string; why: string }
   | { state: "found"; file: string; findings: CheckFinding[]; losses: string[] };
 
+export type CalibrationName = "tip" | "payload" | "scan";
+
+/** A calibration of the scene, and the day of UTC on which it was put there where the scene says it. */
+export interface NamedCalibration {
+  is_there: boolean;
+  date: string | null;
+}
+
+type Triple = [number, number, number];
+
+/** Three numbers and their standard uncertainties. */
+export interface VectorEstimate {
+  value: Triple;
+  std: Triple;
+}
+
+/** What is found, as `touchup calibrate … --json` prints it. */
+export interface TipFound {
+  poses: number;
+  left_out: number;
+  swing_deg: number;
+  offset_mm: VectorEstimate;
+  residual_mm: number;
+}
+
+export interface PayloadFound {
+  static_segments: number;
+  left_out: number[];
+  weight_n: number;
+  weight_std_n: number;
+  mass_kg: number;
+  mass_std_kg: number;
+  centre_mm: VectorEstimate;
+  bias_force_n: VectorEstimate;
+  residual_force_n: number;
+  expected_residual_n: number | null;
+}
+
+export interface ScanFound {
+  pairs: Array<{ name: string; distance_mm: number }>;
+  rms_mm: number;
+  scan_to_space: { position_mm: Triple };
+  shift_std_mm: Triple;
+  turn_std_deg: Triple;
+}
+
+/** A calibration that is made or was made; doubts and losses in the program's own sentences. */
+export type CalibrationChoice =
+  | { state: "none" }
+  | { state: "running"; what: CalibrationName; file: string; share: number | null }
+  | { state: "refused"; what: CalibrationName; file: string; why: string }
+  | { state: "found"; what: CalibrationName; file: string; found: TipFound | PayloadFound | ScanFound; doubts: string[]; losses: string[]; is_used: boolean };
+
 export type SetupStepName = "scan" | "unit" | "tip" | "check" | "start";
 
 export interface SetupState {
@@ -68,8 +121,11 @@ export interface SetupState {
   needs_radius: boolean;
   known_radius_mm: number | null;
   /** Which calibrations the scene has. */
-  calibrations: { scan: boolean; tip: boolean; payload: boolean };
+  calibrations: Record<CalibrationName, NamedCalibration>;
   recordings: SetupFile[];
+  /** Of points. */
+  tables: SetupFile[];
+  calibration: CalibrationChoice;
   check: CheckChoice;
   is_check_over: boolean;
   failure: { step: SetupStepName; why: string } | null;
@@ -89,27 +145,37 @@ export async function askSetup(): Promise<SetupState | "running" | null> {
   }
 }
 
-/** Changes a part of the setup; how it is then. */
-export async function changeSetup(what: SetupStepName, request: object): Promise<SetupState> {
+/** Changes a part of the setup, or only looks; how it is then. */
+export async function changeSetup(what: SetupStepName | "calibrate" | "use" | "look", request: object | null): Promise<SetupState> {
   let answer: Response;
   try {
-    answer = await fetch(`${ADDRESS}/${what}`, { method: "POST", body: JSON.stringify(request) });
+    answer = await (what === "look" ? fetch(ADDRESS, { cache: "no-store" }) : fetch(`${ADDRESS}/${what}`, { method: "POST", body: JSON.stringify(request) }));
   } catch {
     throw new CallError("lost");
   }
-  return told(answer.ok, await answer.text());
+  return answered<SetupState>(answer.ok, await answer.text());
 }
 
-/** Sends a scan; `onProgress` is told the share that has gone. Only this kind of request tells it. */
+/** Sends a scan, which is chosen then; `onProgress` is told the share that has gone. */
 export function sendScan(file: File, onProgress: (share: number) => void): Promise<SetupState> {
+  return send("upload", file, onProgress);
+}
+
+/** Sends a recording or a table of points: the name that it has then. */
+export async function sendFile(file: File, onProgress: (share: number) => void): Promise<string> {
+  return (await send<{ file: string }>("file", file, onProgress)).file;
+}
+
+/** Only this kind of request tells how much has gone. */
+function send<T>(where: string, file: File, onProgress: (share: number) => void): Promise<T> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open("POST", `${ADDRESS}/upload?name=${encodeURIComponent(file.name)}`);
+    request.open("POST", `${ADDRESS}/${where}?name=${encodeURIComponent(file.name)}`);
     request.upload.onprogress = ({ loaded, total }) => total > 0 && onProgress(loaded / total);
     request.onerror = () => reject(new CallError("lost"));
     request.onload = () => {
       try {
-        resolve(told(request.status === 200, request.responseText));
+        resolve(answered<T>(request.status === 200, request.responseText));
       } catch (error) {
         reject(error);
       }
@@ -118,13 +184,13 @@ export function sendScan(file: File, onProgress: (share: number) => void): Promi
   });
 }
 
-function told(isGood: boolean, text: string): SetupState {
-  let found: SetupState | { error: string };
+function answered<T>(isGood: boolean, text: string): T {
+  let found: T | { error: string };
   try {
     found = JSON.parse(text);
   } catch {
     throw new CallError("lost");
   }
-  if (isGood) return found as SetupState;
+  if (isGood) return found as T;
   throw new CallError("refused", (found as { error: string }).error);
 }

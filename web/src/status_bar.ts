@@ -31,6 +31,8 @@ export class StatusBar {
   ) {
     const setup = button("check", "setupOpen", onSetup, "square", true);
     const share = button("share", "share", onShare, "square", true);
+    // of a replay nothing is to be checked, and nobody is to be let in
+    setup.hidden = share.hidden = model.replayed !== null;
     const right = el("div", { class: "choices" }, setup, share, settingsMenu(onTheme));
     this.element = el("header", { class: "bar" }, this.part, this.line, this.input, this.role, right);
     model.on(["diagnostics"], () => (this.badSince = (model.input?.level ?? 0) > 0 ? this.badSince + 1 : 0));
@@ -42,7 +44,7 @@ export class StatusBar {
   private show(): void {
     const { state, line, input } = this.model;
     write(this.part, state === null ? t("appName") : `${state.scan.file} · ${state.session}`);
-    const words = { connecting: t("lineConnecting"), connected: t("lineConnected"), waiting: "" };
+    const words = { connecting: t("lineConnecting"), connected: t("lineConnected"), ended: t("lineEnded"), waiting: "" };
     write(this.line, line.kind === "waiting" ? t("lineWaiting", { seconds: line.seconds }) : words[line.kind]);
     this.line.dataset.level = line.kind === "connected" ? "good" : "bad";
     const level = state?.is_paused ? -1 : (input?.level ?? -2);
@@ -50,7 +52,8 @@ export class StatusBar {
     write(this.input, level === -1 ? t("inputPaused") : level >= 0 ? t(INPUT_TEXTS[level] ?? "inputStale") : "");
     this.input.dataset.level = level === 0 ? "good" : level === 2 ? "bad" : "warn";
     this.role.hidden = state === null;
-    if (state !== null) say(this.role, state.role === "operate" ? "roleOperate" : "roleLook");
+    if (this.model.replayed !== null) say(this.role, "replayRole");
+    else if (state !== null) say(this.role, state.role === "operate" ? "roleOperate" : "roleLook");
     this.remedy.hidden = this.badSince < ENDURED || !(level > 0) || line.kind !== "connected";
     if (!this.remedy.hidden) this.remedy.replaceChildren(el("strong", {}, `${this.input.textContent}: `), input?.message ?? "");
   }

@@ -4,6 +4,7 @@
  * Words are those of the trade where it has them (ISO 286, ISO 1101, ISO 14253), and plain ones else.
  */
 
+import { replayTexts } from "./texts_replay";
 import { setupTexts } from "./texts_setup";
 
 export const LANGUAGES = ["en", "de", "es"] as const;
@@ -15,6 +16,7 @@ type Row = readonly [en: string, de: string, es: string];
 
 export const texts = {
   ...setupTexts,
+  ...replayTexts,
   // the bar at the top
   appName: ["touchup", "touchup", "touchup"],
   lineConnecting: ["connecting …", "verbinde …", "conectando …"],

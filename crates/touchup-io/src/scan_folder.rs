@@ -1,5 +1,5 @@
-//! A folder from which somebody else chooses scans and recordings, and to which scans are added: nothing outside of it is listed, read or
-//! written, and nothing in it is written over.
+//! A folder from which somebody else chooses scans, recordings and tables of points, and to which they are added: nothing outside of it is
+//! listed, read or written, and nothing in it is written over.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -11,12 +11,17 @@ use tempfile::TempPath;
 
 use super::atomic::remove_left;
 use super::mesh_file::SCAN_EXTENSIONS;
+use super::recording::{is_of_recording, own_files};
 use super::session_folder::is_plain_name;
 
 /// Recordings that are one file, by extension.
 const RECORDING_EXTENSIONS: &[&str] = &["mcap", "db3"];
+/// Tables of points.
+const TABLE_EXTENSIONS: &[&str] = &["csv"];
 /// Files in a list at most: the newest.
 const MOST_LISTED: usize = 500;
+/// Files of a folder that are looked at, at most, to see whether it is a recording.
+const MOST_LOOKED_AT: usize = 1000;
 /// Bytes of a name at most, as file systems have it, with room for a number.
 const LONGEST_NAME: usize = 200;
 /// Files of one name at most.
@@ -29,8 +34,10 @@ const UPLOAD_STEM: &str = ".upload.";
 pub enum FolderFileKind {
     /// a mesh or a point cloud
     Scan,
-    /// a ROS 2 recording in one file
+    /// a ROS 2 recording: one file, or a folder of rosbag2
     Recording,
+    /// points picked on a scan
+    PointTable,
 }
 
 impl FolderFileKind {
@@ -41,20 +48,22 @@ impl FolderFileKind {
             Some(Self::Scan)
         } else if is_of(RECORDING_EXTENSIONS) {
             Some(Self::Recording)
+        } else if is_of(TABLE_EXTENSIONS) {
+            Some(Self::PointTable)
         } else {
             None
         }
     }
 }
 
-/// A file that can be chosen.
+/// A file that can be chosen, or a folder that is one recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FolderFile {
     /// without a folder
     pub name: String,
-    /// its length
+    /// its length, or that of all files in the folder
     pub bytes: u64,
-    /// when it was changed, s since 1970 UTC; `None` where the system does not say
+    /// when it was changed, or a file was added to the folder or taken away, s since 1970 UTC; `None` where the system does not say
     pub modified_s: Option<u64>,
 }
 
@@ -67,11 +76,25 @@ pub enum ScanFolderError {
     /// Its extension says that it is something else.
     #[error("\"{0}\" is no scan by its name: it must end in one of {known}", known = SCAN_EXTENSIONS.join(", "))]
     NotAScan(String),
+    /// Its extension says that it is something else.
+    #[error(
+        "\"{0}\" is neither a recording nor a table of points by its name: it must end in one of {known}, {tables}",
+        known = RECORDING_EXTENSIONS.join(", "),
+        tables = TABLE_EXTENSIONS.join(", ")
+    )]
+    NotARecording(String),
+    /// A folder that is no recording, or leads out of itself.
+    #[error(
+        "\"{0}\" is no whole recording of rosbag2: metadata.yaml must name files that lie in it, and none of them may be a link"
+    )]
+    NotABag(String),
     /// There is none of that name, or it is a link or a folder.
     #[error("there is no file \"{0}\" in the folder of scans: look at the list again")]
     NotThere(String),
     /// More came than is taken.
-    #[error("the file is larger than {0} bytes: make the scan coarser, or copy it into the folder of scans")]
+    #[error(
+        "the file is larger than {0} bytes: make a scan coarser, a recording shorter, or copy it into the folder of scans"
+    )]
     TooLarge(u64),
     /// What the system says.
     #[error("the folder of scans cannot be used: {0}")]
@@ -102,7 +125,7 @@ impl ScanFolder {
         &self.path
     }
 
-    /// The plain files of a kind that lie in it, the newest first; links are left out.
+    /// The plain files of a kind that lie in it, the newest first, and of recordings the folders too; links are left out.
     ///
     /// # Errors
     /// Whatever the system reports of the folder.
@@ -114,11 +137,14 @@ impl ScanFolder {
                 continue;
             };
             let Ok(name) = name.into_string() else { continue };
-            if about.is_file() && is_plain_name(&name) && FolderFileKind::of_name(&name) == Some(kind) {
-                let since = |time: SystemTime| time.duration_since(UNIX_EPOCH).ok();
-                let modified_s = about.modified().ok().and_then(since).map(|since| since.as_secs());
-                found.push(FolderFile { name, bytes: about.len(), modified_s });
-            }
+            let bytes = match about.is_dir() {
+                _ if !is_plain_name(&name) => None,
+                true if kind == FolderFileKind::Recording => bag_bytes(&self.path.join(&name)),
+                _ => (about.is_file() && FolderFileKind::of_name(&name) == Some(kind)).then_some(about.len()),
+            };
+            let since = |time: SystemTime| time.duration_since(UNIX_EPOCH).ok();
+            let modified_s = about.modified().ok().and_then(since).map(|since| since.as_secs());
+            found.extend(bytes.map(|bytes| FolderFile { name, bytes, modified_s }));
         }
         found.sort_by(|a, b| b.modified_s.cmp(&a.modified_s).then_with(|| a.name.cmp(&b.name)));
         found.truncate(MOST_LISTED);
@@ -135,10 +161,13 @@ impl ScanFolder {
         }
         let path = self.path.join(name);
         // a link may lead anywhere
-        let is_there = fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
-        match is_there && FolderFileKind::of_name(name) == Some(kind) {
-            true => Ok(path),
-            false => Err(ScanFolderError::NotThere(name.to_owned())),
+        match fs::symlink_metadata(&path) {
+            Ok(about) if about.is_file() && FolderFileKind::of_name(name) == Some(kind) => Ok(path),
+            Ok(about) if about.is_dir() && kind == FolderFileKind::Recording => match own_files(&path) {
+                Some(_) => Ok(path),
+                None => Err(ScanFolderError::NotABag(name.to_owned())),
+            },
+            _ => Err(ScanFolderError::NotThere(name.to_owned())),
         }
     }
 
@@ -159,15 +188,16 @@ impl ScanFolder {
         free.unwrap_or_else(|| self.path.join(format!("{stem}.{extension}")))
     }
 
-    /// Begins a new scan, which is there when it is whole.
+    /// Begins a new file, which is there when it is whole.
     ///
     /// - `name`: as its owner calls it; what a file's name had better not have becomes `_`.
+    /// - `is_scan`: whether it has to be a scan by its name, or else a recording or a table.
     /// - `most`: bytes at most.
     ///
     /// # Errors
     /// [`ScanFolderError`]
-    pub fn begin_upload(&self, name: &str, most: u64) -> Result<ScanUpload, ScanFolderError> {
-        let name = cleaned(name)?;
+    pub fn begin_upload(&self, name: &str, is_scan: bool, most: u64) -> Result<ScanUpload, ScanFolderError> {
+        let name = cleaned(name, is_scan)?;
         remove_left(&self.path, UPLOAD_STEM);
         let prefix = format!("{UPLOAD_STEM}{}-", std::process::id());
         let made = tempfile::Builder::new()
@@ -179,19 +209,32 @@ impl ScanFolder {
     }
 }
 
+/// Length of all files in a folder that looks like a recording of rosbag2; `None`: it does not.
+fn bag_bytes(folder: &Path) -> Option<u64> {
+    let (mut bytes, mut is_recording) = (0, false);
+    for entry in fs::read_dir(folder).ok()?.flatten().take(MOST_LOOKED_AT) {
+        let Some(about) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
+        bytes += about.len();
+        is_recording |= entry.file_name().to_str().is_some_and(is_of_recording);
+    }
+    is_recording.then_some(bytes)
+}
+
 /// A name as the folder has it.
-fn cleaned(name: &str) -> Result<String, ScanFolderError> {
+fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
     if !is_plain_name(name) || name.len() > LONGEST_NAME {
         return Err(ScanFolderError::NotAPlainName(name.chars().take(LONGEST_NAME).collect()));
     }
-    if FolderFileKind::of_name(name) != Some(FolderFileKind::Scan) {
-        return Err(ScanFolderError::NotAScan(name.to_owned()));
+    match FolderFileKind::of_name(name) {
+        Some(kind) if (kind == FolderFileKind::Scan) == is_scan => {}
+        _ if is_scan => return Err(ScanFolderError::NotAScan(name.to_owned())),
+        _ => return Err(ScanFolderError::NotARecording(name.to_owned())),
     }
     let is_plain = |c: char| c.is_alphanumeric() || "-_.()+ ".contains(c);
     Ok(name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect())
 }
 
-/// A scan on its way; dropped before it is whole, nothing is left of it.
+/// A file on its way; dropped before it is whole, nothing is left of it.
 #[derive(Debug)]
 pub struct ScanUpload {
     folder: PathBuf,
@@ -241,7 +284,7 @@ mod tests {
     use super::*;
 
     fn uploaded(folder: &ScanFolder, name: &str, text: &str) -> Result<String, ScanFolderError> {
-        let mut upload = folder.begin_upload(name, 10)?;
+        let mut upload = folder.begin_upload(name, true, 10)?;
         upload.add(text.as_bytes())?;
         upload.commit()
     }
@@ -254,7 +297,7 @@ mod tests {
         assert_eq!(uploaded(&folder, "part.ply", "two").unwrap(), "part-2.ply");
         assert_eq!(uploaded(&folder, "part.ply", "three").unwrap(), "part-3.ply");
         assert!(matches!(uploaded(&folder, "part.ply", "eleven char").unwrap_err(), ScanFolderError::TooLarge(10)));
-        let mut upload = folder.begin_upload("other.stl", 10).unwrap();
+        let mut upload = folder.begin_upload("other.stl", true, 10).unwrap();
         upload.add(b"half").unwrap();
         drop(upload);
         let mut names: Vec<_> = fs::read_dir(place.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -274,6 +317,12 @@ mod tests {
             assert!(matches!(uploaded(&folder, name, "x").unwrap_err(), ScanFolderError::NotAScan(_)), "{name}");
         }
         assert_eq!(uploaded(&folder, "Gehäuse 7 (neu)'$.STL", "x").unwrap(), "Gehäuse 7 (neu)__.STL");
+        let beside = |name| folder.begin_upload(name, false, 10).and_then(ScanUpload::commit);
+        assert_eq!(beside("swing.mcap").unwrap(), "swing.mcap");
+        assert_eq!(beside("points.csv").unwrap(), "points.csv");
+        for name in ["part.ply", "scene.yaml", "swing"] {
+            assert!(matches!(beside(name).unwrap_err(), ScanFolderError::NotARecording(_)), "{name}");
+        }
     }
 
     #[test]
@@ -305,5 +354,46 @@ mod tests {
         for name in ["link.ply", "folder.ply", "touch.mcap", "none.ply", "../part.ply"] {
             assert!(folder.file(name, FolderFileKind::Scan).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn a_folder_of_rosbag2_is_a_recording_unless_it_leads_out_of_itself() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = ScanFolder::open(place.path()).unwrap();
+        fs::write(place.path().join("outside.mcap"), "x").unwrap();
+        let make = |name: &str, listed: &str| {
+            let bag = place.path().join(name);
+            fs::create_dir(&bag).unwrap();
+            fs::write(bag.join("bag_0.mcap"), "0123456789").unwrap();
+            let metadata = format!("rosbag2_bagfile_information:\n  relative_file_paths: [{listed}]\n");
+            fs::write(bag.join("metadata.yaml"), metadata).unwrap();
+            bag
+        };
+        make("whole", "bag_0.mcap");
+        // as early versions of rosbag2 name them
+        make("early", "early/bag_0.mcap");
+        for (name, listed) in [("up", "../outside.mcap"), ("root", "/etc/hostname"), ("lost", "bag_1.mcap")] {
+            make(name, listed);
+        }
+        let linked = make("linked", "bag_1.mcap");
+        std::os::unix::fs::symlink(place.path().join("outside.mcap"), linked.join("bag_1.mcap")).unwrap();
+        fs::create_dir(place.path().join("photos")).unwrap();
+        std::os::unix::fs::symlink(place.path().join("whole"), place.path().join("link")).unwrap();
+        let mut found = folder.list(FolderFileKind::Recording).unwrap();
+        found.sort_by(|a, b| a.name.cmp(&b.name));
+        let names: Vec<_> = found.iter().map(|file| &*file.name).collect();
+        assert_eq!(names, ["early", "linked", "lost", "outside.mcap", "root", "up", "whole"]);
+        assert!(found[6].bytes > 10);
+        for name in ["whole", "early"] {
+            assert_eq!(folder.file(name, FolderFileKind::Recording).unwrap(), folder.path().join(name));
+        }
+        for name in ["up", "root", "lost", "linked"] {
+            let refused = folder.file(name, FolderFileKind::Recording).unwrap_err();
+            assert!(matches!(refused, ScanFolderError::NotABag(_)), "{name}: {refused}");
+        }
+        for name in ["photos", "link", "."] {
+            assert!(folder.file(name, FolderFileKind::Recording).is_err(), "{name}");
+        }
+        assert!(folder.file("whole", FolderFileKind::Scan).is_err());
     }
 }

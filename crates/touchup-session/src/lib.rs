@@ -8,12 +8,14 @@
 //! | [`scene`] | the YAML that names the parts of a scene and their parameters |
 //! | [`live`] | the engine: the haptic update at every sample, the patch beside it or at the end |
 //! | [`replay`] | a recording from its first message to its last, as messages or as samples |
+//! | [`calibration`] | tip, payload and place of the scan: from a recording to what is put into a scene |
 //! | [`input_check`] | what speaks against a recording on a scan |
 //! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub use touchup_io::reported;
 
+pub mod calibration;
 pub mod clock;
 pub mod input_check;
 pub mod live;

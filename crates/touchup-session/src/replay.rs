@@ -75,6 +75,17 @@ impl Recording {
         self.reader.message_count()
     }
 
+    /// The next pose or wrench; frames of markers are passed over. After damage the error, then `None`.
+    pub fn next_message(&mut self) -> Option<Result<Message, RecordingError>> {
+        loop {
+            match self.next()? {
+                Ok(Record::Message(message)) => return Some(Ok(message)),
+                Ok(Record::Markers(_)) => {}
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+
     fn next(&mut self) -> Option<Result<Record, RecordingError>> {
         self.ahead.pop_front().or_else(|| self.reader.next_record())
     }

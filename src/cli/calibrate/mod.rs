@@ -1,6 +1,5 @@
 //! `touchup calibrate`: parameters of scan, sensor and tip, identified and written into the scene.
 
-mod number;
 mod payload;
 mod recording;
 mod scan;
@@ -10,9 +9,8 @@ mod tip;
 
 use clap::Subcommand;
 
-use self::number::{Vector, rounded};
-use self::recording::CalibrationRecording;
-use self::target::{Calibrated, CalibrationTarget, DraftScene};
+use self::recording::RecordingFlags;
+use self::target::CalibrationTarget;
 use super::{CliError, Losses};
 
 #[derive(Debug, Subcommand)]

@@ -4,16 +4,14 @@ use std::path::Path;
 
 use clap::Args;
 
+use crate::calibration::{CalibrationError, CalibrationRecording};
 use crate::cli::CliError;
 use crate::cli::progress::WorkProgress;
-use crate::io::recording::{StampSource, Topics};
-use crate::replay::{Recording, Replayed, each_sample, marker_filter};
-use crate::scene::Scene;
-use crate::stylus::{Placement, Sample};
+use crate::io::recording::Topics;
 
-/// A recording made for a calibration.
+/// What is read of a recording made for a calibration.
 #[derive(Debug, Args)]
-pub(super) struct CalibrationRecording {
+pub(super) struct RecordingFlags {
     /// geometry_msgs/WrenchStamped
     #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
     wrench_topic: String,
@@ -25,19 +23,17 @@ pub(super) struct CalibrationRecording {
     markers_topic: Option<String>,
 }
 
-impl CalibrationRecording {
-    pub fn open(&self, bag: &Path) -> Result<Recording, CliError> {
+impl RecordingFlags {
+    /// What `calibrate` makes of a recording, with a bar while it is replayed.
+    pub fn calibrate<C>(
+        &self,
+        bag: &Path,
+        calibrate: impl FnOnce(CalibrationRecording, &mut dyn FnMut()) -> Result<C, CalibrationError>,
+    ) -> Result<C, CliError> {
         let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
         let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        Ok(Recording::open(bag, &topics, StampSource::Header)?)
-    }
-
-    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
-    /// is.
-    pub fn replay(&self, recording: Recording, scene: &Scene, each: impl FnMut(&Sample)) -> Result<Replayed, CliError> {
-        let markers = marker_filter(scene, self.markers_topic.as_deref())?;
-        let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
+        let recording = CalibrationRecording::open(bag, &topics)?;
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        Ok(each_sample(recording, placement, scene.sync_params(), markers, &mut || progress.step(), &mut |_| (), each)?)
+        Ok(calibrate(recording, &mut || progress.step())?)
     }
 }

@@ -1,15 +1,16 @@
 //! Where the result of a calibration goes: into a scene.
 
-use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use clap::Args;
-use serde::Serialize;
+use tracing::warn;
 
-use crate::cli::{CliError, check_kept, not_written, print_report};
+use crate::calibration::{Calibrated, Calibration, calibrated_scene};
+use crate::cli::{CliError, Losses, check_kept, not_written, print_report};
 use crate::io::atomic::write_atomically;
-use crate::scene::{Scene, Setting};
+use crate::scene::Scene;
 
 /// Error of a calibration with an arm but without a scene.
 const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
@@ -66,19 +67,13 @@ impl CalibrationTarget {
         Ok((scene, self.open_scene()?))
     }
 
-    /// Puts `found` into the scene and prints what it was.
-    pub fn write(&self, draft: &DraftScene, found: &impl Calibrated) -> Result<(), CliError> {
-        let mut expected = draft.scene.clone();
-        let (settings, remark) = found.set_in(&mut expected);
-        let text = Scene::edited(&draft.text, &settings, &remark, &expected)?;
+    /// Puts what was found into the scene and prints what it was; what the recording lacks.
+    pub fn write(&self, draft: &DraftScene, calibration: Calibration<impl Calibrated>) -> Result<Losses, CliError> {
+        let Calibration { found, doubts, losses } = calibration;
+        doubts.iter().for_each(|doubt| warn!("{doubt}"));
+        let text = calibrated_scene(&draft.text, &found, SystemTime::now())?;
         write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
-        print_report(self.json, found, || format!("{found}\nwrote {}", self.out.display()))?;
-        Ok(())
+        print_report(self.json, &found, || format!("{found}\nwrote {}", self.out.display()))?;
+        Ok(losses)
     }
-}
-
-/// The result of a calibration, as it is printed, and what it changes in a scene.
-pub(super) trait Calibrated: Serialize + Display {
-    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they come from.
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
 }

@@ -1,19 +1,17 @@
 //! `touchup calibrate tip`: where the ball is: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of
 //! one flat spot with a probe that leans.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::super::arm::{CellArguments, Measurement, RobotName, TouchesOutput};
 use super::super::probing::{KeptMeasurements, millimetres};
-use super::super::{CliError, Losses, reported};
-use super::{Calibrated, CalibrationRecording, CalibrationTarget, Vector, rounded};
-use crate::calibrate::{PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip, fit_tip_by_plane};
-use crate::probing::execute::{Cell, NotReached, TipPoses};
-use crate::scene::{Scene, Setting};
+use super::super::{CliError, Losses};
+use super::{CalibrationTarget, RecordingFlags};
+use crate::calibration::{calibrate_tip, calibrate_tip_by_arm};
+use crate::scene::Scene;
 use crate::sim::ArmParams;
 
 #[derive(Debug, Args)]
@@ -36,36 +34,9 @@ pub(in crate::cli) struct TipArguments {
     #[command(flatten)]
     output: TouchesOutput,
     #[command(flatten)]
-    source: CalibrationRecording,
+    source: RecordingFlags,
     #[command(flatten)]
     target: CalibrationTarget,
-}
-
-/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
-const MOST_POSES: usize = 200_000;
-
-/// Every so many-th pose of a swing.
-struct Swing {
-    poses: Vec<SwingPose>,
-    stride: usize,
-    seen: usize,
-}
-
-impl Swing {
-    fn push(&mut self, pose: SwingPose) {
-        if self.seen.is_multiple_of(self.stride) {
-            if self.poses.len() == MOST_POSES {
-                let mut at = 0;
-                self.poses.retain(|_| {
-                    at += 1;
-                    at % 2 == 1
-                });
-                self.stride *= 2;
-            }
-            self.poses.push(pose);
-        }
-        self.seen += 1;
-    }
 }
 
 /// The verb.
@@ -76,14 +47,8 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     }
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
-    let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
-    let mut scene = draft.scene.clone();
-    // the poses as they are recorded: an older offset does not count
-    scene.tip.iter_mut().for_each(|tip| tip.offset = None);
-    let replayed = source.replay(source.open(bag)?, &scene, |sample| swing.push(sample.pose_ot))?;
-    let fit = fit_tip(&swing.poses, &TipFitParams::default()).map_err(|error| CliError::calibration(bag, error))?;
-    target.write(&draft, &TipFound::of(&fit))?;
-    Ok(replayed.losses)
+    let calibration = source.calibrate(bag, |recording, at_each| calibrate_tip(recording, &draft.scene, at_each))?;
+    target.write(&draft, calibration)
 }
 
 /// - `spot`: as it was written, X,Y,Z in mm.
@@ -99,81 +64,5 @@ fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<
         Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
     };
     let (measured, of_arm) = cell.measure(robot, scene, measurement, truth, |prober| prober.measure_tip(&place))?;
-    let TipPoses { poses_bf, normal_b, not_reached } = measured;
-    let fit = fit_tip_by_plane(&poses_bf, &normal_b).map_err(CliError::arm)?;
-    target.write(&draft, &PivotFound::of(&fit, &of_arm, &not_reached))?;
-    Ok(Losses::new())
-}
-
-reported! {
-    /// What `--json` prints.
-    struct TipFound, fn of(fit: &TipFit) {
-        poses: usize = fit.poses,
-        left_out: usize = fit.rejected,
-        swing_deg: f64 = fit.swing.to_degrees(),
-        /// in the axes of the recorded pose
-        offset_mm: Vector = Vector::of(&fit.offset, 1e3),
-        /// centre of the resting ball, in the frame of the poses
-        rest_mm: Vector = Vector::of(&fit.rest, 1e3),
-        residual_mm: f64 = fit.rms * 1e3,
-        /// number of independent poses with the same information
-        correlation: f64 = fit.correlation,
-    }
-}
-
-impl Calibrated for TipFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-        let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
-        scene.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
-        let remark = format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm);
-        (vec![Setting::list("tip.offset_mm", &offset_mm)], remark)
-    }
-}
-
-impl fmt::Display for TipFound {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { poses, left_out, swing_deg, offset_mm, rest_mm, residual_mm, .. } = self;
-        writeln!(f, "poses: {poses}, left out: {left_out}; swung by {swing_deg:.0}° or more across every axis")?;
-        writeln!(f, "offset      {offset_mm} mm, in the axes of the recorded pose")?;
-        writeln!(f, "rested at   {rest_mm} mm, in the frame of the poses")?;
-        write!(f, "residuals   {residual_mm:.4} mm rms")
-    }
-}
-
-reported! {
-    /// What `--json` prints of an arm.
-    struct PivotFound, fn of(fit: &PlaneTipFit, cell: &Cell, unreached: &[NotReached]) {
-        touches: usize = fit.touches,
-        /// centre of the ball in the flange
-        tip_position_mm: Vector = Vector::of(&moved(cell.pose_ft.translation.vector, &fit.offset), 1e3),
-        /// correction to the scene, in the flange
-        moved_mm: [f64; 3] = (fit.offset.value * 1e3).into(),
-        residual_mm: f64 = fit.rms * 1e3,
-        /// unreachable orientations, and why
-        not_reached: Vec<String> = unreached.iter().map(ToString::to_string).collect(),
-    }
-}
-
-fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
-    VectorEstimate { value: from + by.value, sigma: by.sigma }
-}
-
-impl Calibrated for PivotFound {
-    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-        let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
-        scene.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;
-        let remark = format!("tip: {} touches, residuals {:.4} mm rms", self.touches, self.residual_mm);
-        (vec![Setting::list("robot.tip_position_mm", &tip_position_mm)], remark)
-    }
-}
-
-impl fmt::Display for PivotFound {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
-        let [x, y, z] = self.moved_mm;
-        writeln!(f, "touches: {}", self.touches)?;
-        writeln!(f, "tip         {} mm, in the flange", self.tip_position_mm)?;
-        writeln!(f, "that is     {x:+.4}, {y:+.4}, {z:+.4} mm from where the scene had it")?;
-        write!(f, "residuals   {:.4} mm rms off one plane", self.residual_mm)
-    }
+    target.write(&draft, calibrate_tip_by_arm(&measured, &of_arm).map_err(CliError::arm)?)
 }

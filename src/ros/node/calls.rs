@@ -13,7 +13,7 @@ use super::error::NodeError;
 use super::feature_messages::kind_of;
 use super::refinement::RefinementWorker;
 use super::replica::MeshVersion;
-use super::session::{NodeSession, ResultFiles};
+use super::session::ResultFiles;
 use super::take_out::BUSY;
 use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
@@ -40,6 +40,9 @@ const MOST_SAVING: usize = 4;
 
 impl RefinementWorker {
     pub(super) fn call(&mut self, call: Call) {
+        if self.session.keeping.is_replayed() {
+            return Self::refuse_in_replay(call);
+        }
         match call {
             Call::Flag(request, reply) => match self.flag_of(&request) {
                 Ok(flag) => self.ask_features(FeatureInput::Flag(flag, Some(reply))),
@@ -136,7 +139,7 @@ impl RefinementWorker {
         reply.send(ResyncMeshResponse {
             success: sent,
             message: message.to_owned(),
-            session: self.session.folder.name().to_owned(),
+            session: self.session.name.clone(),
             version: self.session.version,
         });
     }
@@ -174,11 +177,13 @@ impl RefinementWorker {
     }
 
     /// Ends the session beside the next one.
-    fn begin_again(&mut self) -> Result<String, NodeError> {
-        let next = NodeSession::begin(&self.setup)?;
-        self.finish_samples();
+    pub(super) fn begin_again(&mut self) -> Result<String, NodeError> {
+        let next = self.session.next(&self.setup)?;
+        if !next.keeping.is_replayed() {
+            self.finish_samples();
+        }
         let report = self.report();
-        let name = next.folder.name().to_owned();
+        let name = next.name.clone();
         let before = self.change_session(next);
         let setup = Arc::clone(&self.setup);
         let end = move || {

@@ -48,7 +48,7 @@ impl RefinementWorker {
         if let Some(fault) = &self.fault {
             return (DiagnosticStatus::ERROR, format!("stopped: {fault}"));
         }
-        if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.session.recorder.unrecorded() {
+        if let Unrecorded { reason: Some(reason), is_refused: true, .. } = self.session.keeping.unrecorded() {
             let words = format!("does not record, make room on the disk and it goes on: {reason}");
             return (DiagnosticStatus::ERROR, words);
         }
@@ -161,7 +161,7 @@ impl RefinementWorker {
 
     fn numbers(&self, report: &SessionReport) -> Vec<KeyValue> {
         let us = |ns: u64| format!("{:.1}", ns as f64 * 1e-3);
-        let unrecorded = self.session.recorder.unrecorded();
+        let unrecorded = self.session.keeping.unrecorded();
         let shared = &self.setup.shared;
         let mut values = vec![
             value("session", &report.session),

@@ -198,6 +198,7 @@ impl RefinementWorker {
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
             Arrival::Viewer => self.setup.shared.has_new_viewer.store(true, Ordering::Relaxed),
             Arrival::Evidence(reply) => reply.send(self.session.engine.copy_patcher().ok().flatten()),
+            Arrival::Replay(step, reply) => reply.send(self.replay_step(step)),
             Arrival::Shutdown => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
@@ -302,12 +303,12 @@ impl RefinementWorker {
             warn!("the clock of both streams was set back: they are taken up where they are now");
             self.resolver.frames.forget_moving();
         }
-        if is_taken {
+        if is_taken && let Some(recorder) = self.session.keeping.recorder() {
             let frame = match (stream, self.session.axes) {
                 (1, WrenchFrame::Sensor) => self.setup.source,
                 _ => self.resolver.recorded_frame(),
             };
-            self.session.recorder.write(message, frame);
+            recorder.write(message, frame);
         }
         while let Some(sample) = self.session.sync.next_sample() {
             self.sample(&sample, Some(at));
@@ -318,6 +319,9 @@ impl RefinementWorker {
     ///
     /// - `at`: when the message came that completed the sample, where one did.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
+        if !self.follow_record(sample.stamp_ns) {
+            return;
+        }
         let begun = self.setup.clock.now();
         let answer = self.session.engine.answer(sample);
         let answered = self.setup.clock.now();
@@ -389,9 +393,12 @@ impl RefinementWorker {
             self.send_edits();
             self.send_probed();
             self.retry_waiting();
-            self.watch_streams();
+            if !self.session.keeping.is_replayed() {
+                self.watch_streams();
+            }
         }
-        if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY {
+        // of a session that is replayed the streams rest when the replay does
+        if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY && !self.session.keeping.is_replayed() {
             self.diagnosed = now;
             self.doubts.look(&self.setup, &self.session.input, self.session.counters.accepted);
             self.publish_diagnostics();

@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use super::arm::{self, ArmOfNode};
 use super::error::NodeError;
 use super::feature_worker::FeatureWorker;
+use super::keeping::ReplayedSession;
 use super::mesh_patches::MeshPatches;
 use super::refinement::RefinementWorker;
 use super::replica::Edits;
@@ -17,6 +18,7 @@ use super::side_work::begin;
 use super::view::View;
 use crate::clock::Clock;
 use crate::io::mesh_file::MeshUnit;
+use crate::io::session_folder::SessionFolder;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Arrivals;
 use crate::ros::messages::MeshPatch;
@@ -24,6 +26,7 @@ use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
 use crate::scene::{LeftOut, Memory, Scene, SceneCost};
+use crate::session::StrokeChanges;
 
 /// Inputs that wait for the view at most: frames of it are dropped first.
 const VIEW_QUEUE: usize = 256;
@@ -65,7 +68,21 @@ impl Prepared {
     pub fn on(clock: Clock, parameters: Parameters) -> Result<Self, NodeError> {
         let setup = Arc::new(Setup::new(parameters, clock)?);
         let session = NodeSession::begin(&setup)?;
-        setup.shared.mesh.name_session(session.folder.name());
+        setup.shared.mesh.name_session(&session.name);
+        Ok(Self { setup, session })
+    }
+
+    /// Reads scene and scan of a session that was recorded, to replay it: what arrives has to be its messages, with
+    /// [`ReplayStep`](crate::ros::port::ReplayStep)s between. Nothing is kept, calls are refused, and nothing is said of streams.
+    ///
+    /// - `parameters`: its scene, scan, unit and source.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn replayed(parameters: Parameters, folder: SessionFolder, changes: StrokeChanges) -> Result<Self, NodeError> {
+        let setup = Arc::new(Setup::new(parameters, Clock::system())?);
+        let session = NodeSession::replayed(&setup, folder, ReplayedSession::new(changes))?;
+        setup.shared.mesh.name_session(&session.name);
         Ok(Self { setup, session })
     }
 
@@ -132,7 +149,7 @@ impl Prepared {
     /// [`NodeError`]
     pub fn start(self, port: Arc<dyn Port>, arrivals: Arrivals, arm: Option<ArmOfNode>) -> Result<Node, NodeError> {
         let Self { setup, session } = self;
-        let (folder, name) = (session.folder.path().to_owned(), session.folder.name().to_owned());
+        let (folder, name) = (session.folder.path().to_owned(), session.name.clone());
         let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
         let (to_features, feature_inputs) = sync_channel(FEATURE_QUEUE);
         let (to_spare, spare) = sync_channel(EDITS_ROUND);

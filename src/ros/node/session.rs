@@ -10,6 +10,7 @@ use chrono::{DateTime, Utc};
 use serde::Serialize;
 
 use super::error::NodeError;
+use super::keeping::{Keeping, ReplayedSession};
 use super::setup::Setup;
 use super::streams::Epoch;
 use crate::diagnose::InputMonitor;
@@ -41,10 +42,12 @@ impl Counters {
 
 /// What belongs to a session and goes with it.
 pub struct NodeSession {
+    /// by which followers of the mesh know it
+    pub name: String,
     /// where all of it is kept
     pub folder: SessionFolder,
-    /// takes down what is accepted
-    pub recorder: SessionRecorder,
+    /// whether it is recorded, or was
+    pub keeping: Keeping,
     /// moves the mesh
     pub engine: Engine,
     /// axes of the wrenches that the engine expects
@@ -146,11 +149,39 @@ impl NodeSession {
             .map_err(|source| NodeError::Folder { path: parent, source })?;
         SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics, begun)?;
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
+        Self::of(setup, folder.name().to_owned(), folder, Keeping::Recorded(recorder))
+    }
+
+    /// Begins one again that was recorded.
+    ///
+    /// - `folder`: where it is; nothing is written there.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn replayed(setup: &Setup, folder: SessionFolder, replayed: ReplayedSession) -> Result<Self, NodeError> {
+        // followers take each run for another session; no folder is called so
+        let name = format!("{}#{}", folder.name(), replayed.run());
+        Self::of(setup, name, folder, Keeping::Replayed(Box::new(replayed)))
+    }
+
+    /// The one that begins when this is given up.
+    ///
+    /// # Errors
+    /// [`NodeError`]
+    pub fn next(&self, setup: &Setup) -> Result<Self, NodeError> {
+        match &self.keeping {
+            Keeping::Recorded(_) => Self::begin(setup),
+            Keeping::Replayed(replayed) => Self::replayed(setup, self.folder.clone(), replayed.again()),
+        }
+    }
+
+    fn of(setup: &Setup, name: String, folder: SessionFolder, keeping: Keeping) -> Result<Self, NodeError> {
         let axes = WrenchFrame::default();
         let engine = engine_of(setup, axes)?;
         Ok(Self {
+            name,
             folder,
-            recorder,
+            keeping,
             engine,
             axes,
             sent_version: 1,
@@ -182,12 +213,14 @@ impl NodeSession {
         Ok(())
     }
 
-    /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report beside it.
+    /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report beside it. Of one that is replayed
+    /// nothing is written.
     ///
     /// # Errors
     /// [`NodeError`] when the result could not be written; the recording is ended all the same.
     pub fn end(self, setup: &Setup, mut report: SessionReport) -> Result<SessionReport, NodeError> {
-        let Self { folder, recorder, engine, .. } = self;
+        let Self { folder, keeping, engine, .. } = self;
+        let Keeping::Recorded(recorder) = keeping else { return Ok(report) };
         let Unrecorded { messages, reason, .. } = recorder.finish();
         report.unrecorded = messages;
         let mut ended = engine.finish()?;
@@ -227,14 +260,14 @@ impl NodeSession {
         let Self { engine, sync, counters, .. } = self;
         let counts = engine.refiner().counts();
         SessionReport {
-            session: self.folder.name().to_owned(),
+            session: self.name.clone(),
             accepted: counters.accepted,
             refused: self.refused(),
             lost: port.lost(),
             dropped: port.dropped(),
             unsent: port.unsent(),
             paused: counters.paused,
-            unrecorded: self.recorder.unrecorded().messages,
+            unrecorded: self.keeping.unrecorded().messages,
             dropped_view_frames: setup.shared.dropped_frames.load(Ordering::Relaxed),
             gaps,
             clock_jumps: self.epoch.jumps + sync.counts().jump + sync.pose_counts().jump,

@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use tracing::warn;
 
 use super::refinement::RefinementWorker;
+use super::replayed::REPLAYED;
 use super::take_out::{
     BUSY, MOST_ASKED, NO_PATCH, NOTHING_TOUCHED, READ_WAIT, Remade, TakingOut, WantedTouch, answer_of,
     counted_contacts, named, read, refused, touch_of, touches_of,
@@ -121,7 +122,8 @@ impl RefinementWorker {
     /// Takes a change of strokes down.
     pub(super) fn note_stroke(&mut self, change: StrokeChange) {
         self.session.strokes.push(change);
-        if let Err(error) = self.session.recorder.write_stroke(change) {
+        let recorder = self.session.keeping.recorder();
+        if let Some(Err(error)) = recorder.map(|recorder| recorder.write_stroke(change)) {
             warn!(%error, "after a crash this stroke would be as it was");
         }
     }
@@ -166,8 +168,8 @@ impl RefinementWorker {
         let until_ns = self.session.last_ns.ok_or(NOTHING_TOUCHED)?;
         let copy = out.is_none().then(|| self.copied_evidence()).transpose()?;
         let replay = self.session.engine.begin_replay().map_err(|error| error.to_string())?.ok_or(NO_PATCH)?;
-        let flushed = self.session.recorder.flushed();
-        let (setup, recording) = (Arc::clone(&self.setup), self.session.recorder.recording());
+        let recorder = self.session.keeping.recorder().ok_or(REPLAYED)?;
+        let (flushed, recording, setup) = (recorder.flushed(), recorder.recording(), Arc::clone(&self.setup));
         let mut changes: StrokeChanges = self.session.strokes.clone();
         Ok(move || {
             let found = copy.map(|copy| {
@@ -212,7 +214,7 @@ impl RefinementWorker {
 
     /// Without some messages the other touches would not be what they are.
     fn check_recorded(&self) -> Result<(), String> {
-        let unrecorded = self.session.recorder.unrecorded();
+        let unrecorded = self.session.keeping.unrecorded();
         match (unrecorded.messages, unrecorded.reason) {
             (0, _) => Ok(()),
             (count, why) => {

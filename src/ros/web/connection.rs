@@ -114,6 +114,7 @@ async fn send(
     let mut frames = interval(FRAME);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let (mut seen, mut state, mut noted, mut signed) = (0, String::new(), String::new(), Instant::now());
+    let mut replayed = String::new();
     let mut known_state = MeshState::default();
     loop {
         let mut messages = Vec::new();
@@ -123,6 +124,11 @@ async fn send(
         let now = text_of("state", &site.state(role)).unwrap_or_default();
         if now != state {
             state.clone_from(&now);
+            messages.push(Message::text(now));
+        }
+        let now = site.replay.as_ref().and_then(|replay| text_of("replay", &replay.shown())).unwrap_or_default();
+        if now != replayed {
+            replayed.clone_from(&now);
             messages.push(Message::text(now));
         }
         let annotations = site.annotations.of(&site.board.session());

@@ -2,28 +2,28 @@
 //! anything is looked at.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use axum::Router;
 use axum::body::Body;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, State};
+use axum::extract::{Path, Query, State};
 use axum::http::StatusCode;
 use axum::http::header::{self, HeaderMap};
 use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use axum::{Extension, Router};
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::access::Role;
 use super::connection;
 use super::downloads::{body_of, sessions};
 use super::entrance::{self, as_json, refusal};
+use super::page_place::PagePlace;
+use super::replay::{self, Replays};
 use super::reports;
 use super::site::Site;
 
-/// Pages at a time at most.
-const MOST_PAGES: usize = 16;
 /// Bytes that a page may send in one message.
 const LARGEST_MESSAGE: usize = 64 << 10;
 /// Bytes that wait for a page in the socket at most.
@@ -32,11 +32,11 @@ const LARGEST_BACKLOG: usize = 8 << 20;
 const PROTOCOL: &str = "touchup.v1";
 
 /// All that is answered.
-pub(super) fn router(site: Arc<Site>) -> Router {
+pub(super) fn router(site: Arc<Site>, replays: Arc<Replays>) -> Router {
     let checked = from_fn_with_state(Arc::clone(&site.entrance), entrance::check);
     let page = entrance::routes(&site.entrance);
     Router::new()
-        .route("/ws", get(upgrade))
+        .route("/ws", get(upgrade).layer(Extension(replays)))
         .route("/api/state", get(state))
         .route("/api/setup", get(no_setup))
         .route("/api/sessions", get(list_sessions))
@@ -58,7 +58,20 @@ fn role_of(site: &Site, headers: &HeaderMap) -> Result<Role, Box<Response>> {
     site.entrance.role_of(headers)
 }
 
-async fn upgrade(State(site): State<Arc<Site>>, headers: HeaderMap, socket: WebSocketUpgrade) -> Response {
+/// What the socket is for.
+#[derive(Debug, Deserialize)]
+struct SocketQuery {
+    /// session that is to be replayed; without one it is that of the node
+    replay: Option<String>,
+}
+
+async fn upgrade(
+    State(site): State<Arc<Site>>,
+    Extension(replays): Extension<Arc<Replays>>,
+    Query(SocketQuery { replay }): Query<SocketQuery>,
+    headers: HeaderMap,
+    socket: WebSocketUpgrade,
+) -> Response {
     let role = match role_of(&site, &headers) {
         Ok(role) => role,
         Err(response) => return *response,
@@ -68,27 +81,12 @@ async fn upgrade(State(site): State<Arc<Site>>, headers: HeaderMap, socket: WebS
     };
     let socket = socket.protocols([PROTOCOL]).max_message_size(LARGEST_MESSAGE).max_frame_size(LARGEST_MESSAGE);
     socket.max_write_buffer_size(LARGEST_BACKLOG).on_upgrade(move |socket| async move {
-        connection::serve(socket, site, role).await;
+        match replay {
+            None => connection::serve(socket, site, role).await,
+            Some(session) => replay::serve(socket, &replays, &session).await,
+        }
         drop(place);
     })
-}
-
-/// One of the pages at a time.
-struct PagePlace(Arc<Site>);
-
-impl PagePlace {
-    fn take(site: &Arc<Site>) -> Option<Self> {
-        let is_there = |count: usize| (count < MOST_PAGES).then_some(count + 1);
-        let taken = site.pages.fetch_update(Ordering::Relaxed, Ordering::Relaxed, is_there);
-        taken.is_ok().then(|| Self(Arc::clone(site)))
-    }
-}
-
-impl Drop for PagePlace {
-    fn drop(&mut self) {
-        let pages: &AtomicUsize = &self.0.pages;
-        pages.fetch_sub(1, Ordering::Relaxed);
-    }
 }
 
 async fn state(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response {

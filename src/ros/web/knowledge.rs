@@ -10,6 +10,7 @@ use nalgebra::Point3;
 use tokio::sync::oneshot;
 use tokio::time::sleep;
 
+use super::background::begin;
 use super::board::Known;
 use super::mesh_copy::{MeshState, OF_A_MESSAGE, TouchedVertex};
 use super::site::Site;
@@ -46,8 +47,9 @@ pub(super) async fn follow(site: Arc<Site>) {
         site.inbox.put(Arrival::Evidence(Reply::new(move |copy| drop(to.send(copy)))));
         let Ok(Some(copy)) = copy.await else { continue };
         let (scan, touched) = (Arc::clone(&site.scan_mesh), site.board.touched());
-        let evaluated = tokio::task::spawn_blocking(move || frames_of(&copy, &scan, &touched)).await;
-        if let Ok(frames) = evaluated {
+        // of a replay it may be, beside a session that goes on
+        let Ok(evaluated) = begin("knowledge", move || frames_of(&copy, &scan, &touched)) else { continue };
+        if let Ok(frames) = evaluated.await {
             site.board.set_known(Known { state, frames });
         }
     }

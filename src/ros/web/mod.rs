@@ -19,6 +19,9 @@ mod listener;
 mod mesh_copy;
 mod nominal;
 mod page;
+mod page_place;
+mod page_port;
+mod replay;
 mod report_request;
 mod report_work;
 mod reports;
@@ -48,12 +51,14 @@ pub use self::error::WebError;
 pub use self::listener::Certificate;
 use self::listener::Routes;
 use self::nominal::Nominal;
+use self::page_port::PagePort;
+use self::replay::Replays;
 use self::report_work::Reports;
 pub use self::setup::{NodeSetup, SetupParams, SetupStep};
 use self::site::{ScanShown, Site};
 use super::inbox::Inbox;
 use super::messages::MeshPatch;
-use super::port::{Port, Publication};
+use super::port::Port;
 use crate::io::mesh_file::MeshUnit;
 use crate::mesh::{FaceTree, TriMesh};
 
@@ -77,6 +82,8 @@ pub struct NodeFacts {
     pub scan: PathBuf,
     /// it, m in O, with the tree over its faces
     pub scan_mesh: Arc<(TriMesh, FaceTree)>,
+    /// whether an operator has just said on the page how large it is
+    pub is_size_confirmed: bool,
     /// where sessions lie, each in a folder of its own
     pub session_folder: PathBuf,
     /// the part as it should be, m in O; `None`: nobody said
@@ -169,12 +176,14 @@ impl WebServer {
             annotations: Annotations::new(&facts.session_folder),
             nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
             reports: Reports::new(facts.nominal_file, facts.mesh_unit),
-            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count() },
+            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count(), is_size_confirmed: facts.is_size_confirmed },
             scan_mesh: facts.scan_mesh,
             session_folder: facts.session_folder,
             pages: AtomicUsize::new(0),
+            replay: None,
         });
-        self.routes.set(http::router(Arc::clone(&site)));
+        let replays = Replays::new(&self.entrance, &site.session_folder, &self.runtime);
+        self.routes.set(http::router(Arc::clone(&site), replays));
         self.runtime.spawn(knowledge::follow(Arc::clone(&site)));
         Ok(Arc::new(PagePort { network, site }))
     }
@@ -213,48 +222,4 @@ fn own_address(address: SocketAddr) -> Option<String> {
     // of a block for documentation (RFC 5737), so that the way out is that to other networks
     let socket = UdpSocket::bind("0.0.0.0:0").and_then(|socket| socket.connect("192.0.2.1:9").map(|()| socket));
     socket.and_then(|socket| socket.local_addr()).ok().map(|own| in_a_link(own.ip()))
-}
-
-/// Sends to the network and to the pages.
-struct PagePort {
-    network: Arc<dyn Port>,
-    site: Arc<Site>,
-}
-
-impl Port for PagePort {
-    fn publish(&self, publication: Publication) {
-        // those are the mesh and the features again, drawn for RViz
-        if !matches!(publication, Publication::Tile(_) | Publication::FeatureMarkers(_)) {
-            self.site.board.write(publication.clone());
-        }
-        self.network.publish(publication);
-    }
-
-    fn node_name(&self) -> &str {
-        self.network.node_name()
-    }
-
-    fn sample_topics(&self) -> [&str; 2] {
-        self.network.sample_topics()
-    }
-
-    fn now_ns(&self) -> i64 {
-        self.network.now_ns()
-    }
-
-    fn dropped(&self) -> [u64; 2] {
-        self.network.dropped()
-    }
-
-    fn lost(&self) -> [u64; 2] {
-        self.network.lost()
-    }
-
-    fn unsent(&self) -> [u64; 2] {
-        self.network.unsent()
-    }
-
-    fn tiles_waiting(&self) -> usize {
-        self.network.tiles_waiting()
-    }
 }

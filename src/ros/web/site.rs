@@ -13,10 +13,14 @@ use super::board::Board;
 use super::calls::{Answer, Calls, MAY_ONLY_LOOK};
 use super::entrance::Entrance;
 use super::nominal::Nominal;
+use super::replay::ReplayControl;
 use super::report_work::Reports;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::ros::inbox::Inbox;
 use crate::ros::stop::Motion;
+
+/// Why a call is refused where a session is replayed.
+const REPLAYED: &str = "this page replays a session, in which nothing can be changed: open the page of the node";
 
 /// What all pages share.
 pub(super) struct Site {
@@ -33,12 +37,16 @@ pub(super) struct Site {
     pub session_folder: PathBuf,
     /// pages that are open
     pub pages: AtomicUsize,
+    /// of a session that is replayed, how that goes on; then it is all that a page may ask for
+    pub replay: Option<Arc<ReplayControl>>,
 }
 
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ScanShown {
     pub file: String,
     pub faces: usize,
+    /// whether the page need not ask how large it is: an operator has just said so, or the session was touched at this size
+    pub is_size_confirmed: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -70,7 +78,7 @@ impl Site {
         SiteState {
             role,
             program: concat!("touchup ", env!("CARGO_PKG_VERSION")),
-            session: self.board.session(),
+            session: self.replay.as_ref().map_or_else(|| self.board.session(), |replay| replay.session().to_owned()),
             is_paused: stops.is_paused(),
             scan: &self.scan,
             nominal_part: self.reports.part_name(),
@@ -81,6 +89,12 @@ impl Site {
 
     /// A call of a page: of the page's own, or of a service of the node.
     pub fn call(&self, role: Role, name: &str, request: Value, reply: Answer) {
+        if let Some(replay) = &self.replay {
+            return reply.send(match name {
+                "~/replay" => replay.call(request),
+                _ => Err(REPLAYED.to_owned()),
+            });
+        }
         let own: Option<OwnCall> = match name {
             "~/annotate_feature" => Some(Self::annotate),
             "~/invite" => Some(Self::invite),

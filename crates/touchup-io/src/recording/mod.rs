@@ -10,6 +10,7 @@
 mod cdr;
 mod db3;
 mod error;
+mod folder;
 mod framing;
 mod mcap;
 mod point_cloud;
@@ -20,6 +21,7 @@ mod writer;
 
 pub use crate::file_error::FilePlace;
 pub use error::{BadCount, BadMessage, Damage, RecordingError};
+pub(crate) use folder::{is_of_recording, own_files};
 pub use reader::RecordingReader;
 pub use segments::SegmentedWriter;
 pub use writer::{RecordingWriter, write_recording};

@@ -1,19 +1,17 @@
 //! A recording as one sequence of messages, whatever it is kept in.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::iter::FusedIterator;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
-
 use super::cdr::{decode_pose, decode_wrench, unpack};
 use super::db3::{self, Db3Reader};
 use super::error::{BadCount, check_topics};
+use super::folder::files_of;
 use super::mcap::{self, McapReader};
 use super::point_cloud::decode_markers;
-use super::segments::segments_of;
 use super::{
     BadMessage, RawMessage, Record, RecordingError, RecordingFile, StampSource, TopicInfo, TopicKind, Topics,
     ZSTD_MAGIC,
@@ -21,8 +19,6 @@ use super::{
 use touchup_core::stylus::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
-/// Longest `metadata.yaml`: thousands of files and topics.
-const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 /// Poses and wrenches of a recording, one after another.
 ///
@@ -250,53 +246,4 @@ fn describe_front(front: &[u8]) -> String {
     } else {
         format!("it begins with \"{}\", neither MCAP nor rosbag2's SQLite", front.escape_ascii())
     }
-}
-
-/// The part of rosbag2's `metadata.yaml` that is used.
-#[derive(Deserialize)]
-struct Metadata {
-    rosbag2_bagfile_information: BagInformation,
-}
-
-#[derive(Deserialize)]
-struct BagInformation {
-    relative_file_paths: Vec<String>,
-}
-
-/// The files of a recording, in order.
-fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError> {
-    if !path.is_dir() {
-        return Ok(VecDeque::from([path.to_owned()]));
-    }
-    let metadata_path = path.join("metadata.yaml");
-    if !metadata_path.exists() {
-        // a recorder that was killed wrote none
-        let segments = segments_of(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
-        if !segments.is_empty() {
-            return Ok(segments.into());
-        }
-        let reason = "the folder has no metadata.yaml and no .mcap file with anything in it: nothing was recorded, or it is elsewhere";
-        return Err(RecordingError::NotARecording { path: path.to_owned(), reason: reason.to_owned() });
-    }
-    let bad = |reason: String| RecordingError::Metadata { path: metadata_path.clone(), reason };
-    let text = read_metadata(&metadata_path).map_err(|error| bad(error.to_string()))?;
-    let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| bad(error.to_string()))?;
-    let names = metadata.rosbag2_bagfile_information.relative_file_paths;
-    if names.is_empty() {
-        return Err(bad("it names no files".to_owned()));
-    }
-    names.iter().map(|name| find_file(path, name).ok_or_else(|| bad(format!("{name:?} is not there")))).collect()
-}
-
-fn read_metadata(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    File::open(path)?.take(MAX_METADATA_BYTES).read_to_string(&mut text)?;
-    Ok(text)
-}
-
-/// A file named in the metadata; early versions of rosbag2 put the folder's own name in front.
-fn find_file(folder: &Path, name: &str) -> Option<PathBuf> {
-    let in_folder = folder.join(name);
-    let by_last_part = folder.join(Path::new(name).file_name()?);
-    [in_folder, by_last_part].into_iter().find(|path| fs::metadata(path).is_ok_and(|file| file.is_file()))
 }

@@ -58,4 +58,12 @@ impl Scene {
             Err(error) => Err(refused(error.to_string())),
         }
     }
+
+    /// The remark that [`Self::edited`] left behind a key in the text of a scene, without `first`, which it begins with; of whichever
+    /// section has it first.
+    pub fn remark<'a>(yaml: &'a str, key: &str, first: &str) -> Option<&'a str> {
+        let (key, begin) = (format!("{key}:"), format!("{} {first}", block::MARK));
+        let mut of_key = yaml.lines().filter(|line| line.trim_start().starts_with(&key));
+        of_key.find_map(|line| line.split_once(&*begin)).map(|(_, rest)| rest.trim())
+    }
 }

@@ -148,8 +148,16 @@ impl SessionRecord {
             scene: folder.join(SCENE),
             recording: folder.join(RECORDING),
             topics: Topics { pose: pose_topic, wrench: wrench_topic, markers: None },
-            strokes: read_strokes(&folder.join(STROKES))?,
+            strokes: Self::strokes_of(folder)?,
         })
+    }
+
+    /// Reads what was taken back, done again, taken out and put back until now.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn strokes_of(folder: &Path) -> Result<StrokeChanges, SessionError> {
+        read_strokes(&folder.join(STROKES))
     }
 }
 

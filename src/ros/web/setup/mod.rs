@@ -1,12 +1,18 @@
-//! Before there is a node: the scan, its unit and the tip are chosen on the page, step by step, a recording is looked at where there is
-//! one, and the node begins from there.
+//! Before there is a node: the scan, its unit and the tip are chosen on the page, step by step, the sensors are calibrated and looked at by
+//! recordings, and the node begins from there.
 
+mod beside;
+mod calibrating;
+mod checking;
+mod choices;
 mod facts;
+mod found_calibration;
 mod node_setup;
 mod recording_check;
 mod routes;
 mod scene_draft;
 mod setup_shown;
+mod setup_state;
 mod upload;
 
 pub use self::node_setup::{NodeSetup, SetupParams};

@@ -12,11 +12,15 @@ use axum::response::Response;
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::json;
 use tokio::task::spawn_blocking;
 
-use super::node_setup::{NodeSetup, NodeSetupError};
+use super::calibrating::CalibrateRequest;
+use super::node_setup::NodeSetup;
 use super::scene_draft::StatedTip;
+use super::setup_state::NodeSetupError;
 use super::upload;
+use crate::calibration::CalibrationKind;
 use crate::io::mesh_file::MeshUnit;
 use crate::ros::web::access::Role;
 use crate::ros::web::calls::MAY_ONLY_LOOK;
@@ -41,6 +45,9 @@ pub(in crate::ros::web) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetu
         .route("/api/setup/scan", post(choose_scan))
         .route("/api/setup/unit", post(choose_unit))
         .route("/api/setup/tip", post(state_tip))
+        .route("/api/setup/file", post(take_file))
+        .route("/api/setup/calibrate", post(calibrate))
+        .route("/api/setup/use", post(use_calibration))
         .route("/api/setup/check", post(check))
         .route("/api/setup/start", post(start))
         .with_state(Served { entrance: Arc::clone(entrance), setup: Arc::clone(setup) })
@@ -65,6 +72,20 @@ impl Served {
         let setup = Arc::clone(&self.setup);
         let shown = spawn_blocking(move || setup.shown(role)).await.map_err(|error| error.to_string()).flatten();
         shown.map(|shown| as_json(&shown)).map_err(|why| Box::new(refusal(StatusCode::SERVICE_UNAVAILABLE, &why)))
+    }
+
+    /// Takes a file that an operator sends: its name in the folder.
+    async fn take(
+        &self,
+        name: String,
+        is_scan: bool,
+        headers: &HeaderMap,
+        body: Body,
+    ) -> Result<String, Box<Response>> {
+        self.operator(headers)?;
+        let length = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+        let taken = upload::take(&self.setup, name, is_scan, length, body).await;
+        taken.map_err(|(status, why)| Box::new(refusal(status, &why)))
     }
 
     /// Does what an operator asks for, and answers how it is then.
@@ -133,6 +154,22 @@ async fn state_tip(State(served): State<Served>, headers: HeaderMap, body: Body)
     sent(served.change(&headers, body, change).await)
 }
 
+async fn calibrate(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, request: CalibrateRequest| setup.calibrate(&request);
+    sent(served.change(&headers, body, change).await)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct UseRequest {
+    what: CalibrationKind,
+}
+
+async fn use_calibration(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
+    let change = |setup: &Arc<NodeSetup>, UseRequest { what }| setup.use_calibration(what);
+    sent(served.change(&headers, body, change).await)
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CheckRequest {
@@ -163,18 +200,27 @@ async fn take_upload(
     headers: HeaderMap,
     body: Body,
 ) -> Response {
-    if let Err(refused) = served.operator(&headers) {
-        return *refused;
-    }
-    let length = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
-    let file = match upload::take(&served.setup, name, length, body).await {
+    let file = match served.take(name, true, &headers, body).await {
         Ok(file) => file,
-        Err((status, why)) => return refusal(status, &why),
+        Err(refused) => return *refused,
     };
     let setup = Arc::clone(&served.setup);
     match spawn_blocking(move || setup.choose_scan(&file)).await {
         Ok(Ok(())) => sent(served.answer(Role::Operate).await),
         Ok(Err(error)) => refusal(StatusCode::CONFLICT, &error.to_string()),
         Err(error) => refusal(StatusCode::SERVICE_UNAVAILABLE, &error.to_string()),
+    }
+}
+
+/// A recording or a table: the body is the file. Its name is answered, and nothing chosen.
+async fn take_file(
+    State(served): State<Served>,
+    Query(UploadQuery { name }): Query<UploadQuery>,
+    headers: HeaderMap,
+    body: Body,
+) -> Response {
+    match served.take(name, false, &headers, body).await {
+        Ok(file) => as_json(&json!({ "file": file })),
+        Err(refused) => *refused,
     }
 }

@@ -1,9 +1,11 @@
 //! The scene as it is being made: its text, into which the chosen scan, unit and tip are put; everything else in it stays as it was.
 
 use std::path::Path;
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
+use crate::calibration::{Calibrated, CalibrationKind, calibrated_on, calibrated_scene};
 use crate::io::mesh_file::MeshUnit;
 use crate::scene::{Scene, SceneError, Setting};
 
@@ -24,14 +26,22 @@ pub(super) struct StatedTip {
 }
 
 /// Which calibrations a scene has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct NamedCalibrations {
     /// where the scan lies in the frame of the poses
-    scan: bool,
+    scan: NamedCalibration,
     /// the centre of the ball in the tracked stylus
-    tip: bool,
+    tip: NamedCalibration,
     /// weight and bias on the force sensor
-    payload: bool,
+    payload: NamedCalibration,
+}
+
+/// A calibration in a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub(super) struct NamedCalibration {
+    is_there: bool,
+    /// the day on which it was put there, UTC, as 2026-11-27; `None` where the scene does not say it
+    date: Option<String>,
 }
 
 /// A scene with its text.
@@ -52,7 +62,14 @@ impl SceneDraft {
             Some(path) => Scene::read_with_text(path)?.1,
             None => Scene::template_without_radius(),
         };
-        // without the files that it names: they are no part of the text
+        Self::of(text)
+    }
+
+    /// The scene that a text is, without the files that it names: they are no part of it.
+    ///
+    /// # Errors
+    /// [`SceneError`]
+    pub fn of(text: String) -> Result<Self, SceneError> {
         Ok(Self { scene: Scene::from_yaml(&text)?, text })
     }
 
@@ -66,11 +83,30 @@ impl SceneDraft {
     /// Which calibrations are in it (`touchup calibrate`).
     pub fn calibrations(&self) -> NamedCalibrations {
         let Scene { scan_to_space, tip, compensation, .. } = &self.scene;
+        let named = |kind, is_there: bool| {
+            let date = calibrated_on(&self.text, kind).filter(|_| is_there).map(|date| date.to_string());
+            NamedCalibration { is_there, date }
+        };
+        let has_tip = tip.as_ref().is_some_and(|tip| tip.offset.is_some());
+        let has_payload = compensation.as_ref().is_some_and(|one| one.payload.is_some() || one.bias.is_some());
         NamedCalibrations {
-            scan: scan_to_space.is_some(),
-            tip: tip.as_ref().is_some_and(|tip| tip.offset.is_some()),
-            payload: compensation.as_ref().is_some_and(|one| one.payload.is_some() || one.bias.is_some()),
+            scan: named(CalibrationKind::Scan, scan_to_space.is_some()),
+            tip: named(CalibrationKind::Tip, has_tip),
+            payload: named(CalibrationKind::Payload, has_payload),
         }
+    }
+
+    /// The same with a calibration in it.
+    ///
+    /// # Errors
+    /// [`SceneError`]
+    pub fn calibrated(&self, found: &impl Calibrated, now: SystemTime) -> Result<Self, SceneError> {
+        Self::of(calibrated_scene(&self.text, found, now)?)
+    }
+
+    /// Its text.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// The radius that it says, mm.
@@ -120,7 +156,7 @@ mod tests {
     #[test]
     fn what_is_stated_is_in_the_text_and_the_rest_stays_with_its_comments() {
         let text = "# bench 3\ntip: { radius_mm: 2 }\npatch: off  # no time\nuncertainty: off\n";
-        let draft = SceneDraft { text: text.to_owned(), scene: Scene::from_yaml(text).unwrap() };
+        let draft = SceneDraft::of(text.to_owned()).unwrap();
         assert_eq!(draft.radius_mm(), Some(2.0));
         let tip = StatedTip { radius_mm: 1.5, uncertainty_mm: None };
         let made = draft.with(Some(tip), Some(("it's.ply", MeshUnit::Inch))).unwrap();
@@ -129,6 +165,16 @@ mod tests {
         let part = scene.scan.unwrap();
         assert_eq!((part.file.unwrap().to_str(), part.unit), (Some("it's.ply"), MeshUnit::Inch));
         assert!(made.starts_with("# bench 3\n") && made.contains("patch: off  # no time"), "{made}");
+    }
+
+    #[test]
+    fn calibrations_that_are_there_are_shown_with_their_day() {
+        let text = "tip:\n  offset_mm: [0, 0, 1]  # touchup calibrate tip: 9 poses; 2026-02-28\nscan_to_space: {}\n";
+        let draft = SceneDraft::of(text.to_owned()).unwrap();
+        let NamedCalibrations { scan, tip, payload } = draft.calibrations();
+        assert_eq!(tip, NamedCalibration { is_there: true, date: Some("2026-02-28".to_owned()) });
+        assert_eq!(scan, NamedCalibration { is_there: true, date: None });
+        assert_eq!(payload, NamedCalibration { is_there: false, date: None });
     }
 
     #[test]

@@ -3,8 +3,10 @@
 use serde::Serialize;
 
 use super::facts::ScanFacts;
+use super::found_calibration::FoundCalibration;
 use super::recording_check::CheckFacts;
 use super::scene_draft::{NamedCalibrations, StatedTip};
+use crate::calibration::CalibrationKind;
 use crate::io::scan_folder::FolderFile;
 use crate::ros::web::access::Role;
 
@@ -51,6 +53,30 @@ pub(super) enum CheckChoice {
     Found(CheckFacts),
 }
 
+/// A calibration that was made.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case", tag = "state")]
+pub(super) enum CalibrationChoice {
+    None,
+    Running { what: CalibrationKind, file: String, share: Option<f64> },
+    Refused { what: CalibrationKind, file: String, why: String },
+    Found(Box<CalibrationFacts>),
+}
+
+/// What it found.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct CalibrationFacts {
+    pub what: CalibrationKind,
+    pub file: String,
+    pub found: FoundCalibration,
+    /// what should be looked at before it is used
+    pub doubts: Vec<String>,
+    /// what is missing in the recording
+    pub losses: Vec<String>,
+    /// whether it is in the scene
+    pub is_used: bool,
+}
+
 /// Why the node did not begin.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct SetupFailure {
@@ -88,6 +114,9 @@ pub(super) struct SetupShown {
     pub known_radius_mm: Option<f64>,
     pub calibrations: NamedCalibrations,
     pub recordings: Vec<FolderFile>,
+    /// of points
+    pub tables: Vec<FolderFile>,
+    pub calibration: CalibrationChoice,
     pub check: CheckChoice,
     pub is_check_over: bool,
     pub failure: Option<SetupFailure>,

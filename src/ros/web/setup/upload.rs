@@ -1,4 +1,4 @@
-//! A scan that a page sends: piece by piece into the folder of scans.
+//! A scan, a recording or a table that a page sends: piece by piece into the folder of scans.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,8 +9,11 @@ use futures_util::StreamExt;
 use tokio::task::spawn_blocking;
 use tokio::time::timeout;
 
-use super::node_setup::{LARGEST_UPLOAD, NodeSetup, NodeSetupError, UploadPlace};
+use super::node_setup::{LARGEST_UPLOAD, NodeSetup};
+use super::setup_shown::{ScanChoice, UploadShown};
+use super::setup_state::{NodeSetupError, READING};
 use crate::io::scan_folder::{ScanFolderError, ScanUpload};
+use crate::ros::locked;
 
 /// Bytes that are written at a time.
 const PIECE: usize = 1 << 20;
@@ -22,8 +25,9 @@ const STALLED: Duration = Duration::from_secs(30);
 /// Why a file was not taken.
 pub(super) type UploadRefusal = (StatusCode, String);
 
-/// Takes a scan: the name that it has in the folder.
+/// Takes a file: the name that it has in the folder.
 ///
+/// - `is_scan`: a scan, or else a recording or a table of points.
 /// - `length`: bytes that are to come, as far as it was said.
 ///
 /// # Errors
@@ -31,6 +35,7 @@ pub(super) type UploadRefusal = (StatusCode, String);
 pub(super) async fn take(
     setup: &Arc<NodeSetup>,
     name: String,
+    is_scan: bool,
     length: Option<u64>,
     body: Body,
 ) -> Result<String, UploadRefusal> {
@@ -38,7 +43,7 @@ pub(super) async fn take(
         return Err(refusal(ScanFolderError::TooLarge(LARGEST_UPLOAD)));
     }
     let mut pieces = body.into_data_stream();
-    let (place, mut upload) = match begin(setup, name, length).await {
+    let (place, mut upload) = match begin(setup, name, is_scan, length).await {
         Ok(begun) => begun,
         Err(refused) => {
             // a browser that still sends hears no answer
@@ -70,15 +75,53 @@ pub(super) async fn take(
     }
 }
 
+impl NodeSetup {
+    /// Takes the place of the one upload at a time; it is free again when what comes back is dropped.
+    ///
+    /// # Errors
+    /// [`NodeSetupError::NotNow`]
+    fn begin_upload(self: &Arc<Self>, name: &str, of: Option<u64>) -> Result<UploadPlace, NodeSetupError> {
+        let mut state = self.choosing()?;
+        match &state.scan {
+            _ if state.upload.is_some() => {
+                return Err(NodeSetupError::NotNow("another file is on its way: wait for it"));
+            }
+            ScanChoice::Reading { .. } => return Err(READING),
+            _ => {}
+        }
+        state.upload = Some(UploadShown { name: name.chars().take(200).collect(), bytes: 0, of });
+        Ok(UploadPlace(Arc::clone(self)))
+    }
+}
+
+/// The place of an upload.
+struct UploadPlace(Arc<NodeSetup>);
+
+impl UploadPlace {
+    /// So much has come.
+    fn note(&self, so_far: u64) {
+        if let Some(upload) = &mut locked(&self.0.state).upload {
+            upload.bytes = so_far;
+        }
+    }
+}
+
+impl Drop for UploadPlace {
+    fn drop(&mut self) {
+        locked(&self.0.state).upload = None;
+    }
+}
+
 async fn begin(
     setup: &Arc<NodeSetup>,
     name: String,
+    is_scan: bool,
     length: Option<u64>,
 ) -> Result<(UploadPlace, ScanUpload), UploadRefusal> {
     let not_now = |error: NodeSetupError| (StatusCode::CONFLICT, error.to_string());
     let place = setup.begin_upload(&name, length).map_err(not_now)?;
     let folder = setup.folder.clone();
-    let upload = on_disk(move || folder.begin_upload(&name, LARGEST_UPLOAD)).await?;
+    let upload = on_disk(move || folder.begin_upload(&name, is_scan, LARGEST_UPLOAD)).await?;
     Ok((place, upload))
 }
 

@@ -2,13 +2,14 @@
 
 use std::fmt::{self, Display};
 
-use crate::calibrate::VectorEstimate;
-use crate::cli::reported;
+use touchup_core::calibrate::VectorEstimate;
+
+use crate::reported;
 
 reported! {
     /// A value of three components as JSON has it, and its standard uncertainty; `unit`: how many of it are one of SI.
     #[derive(Clone, Copy)]
-    pub(super) struct Vector, pub fn of(known: &VectorEstimate, unit: f64) {
+    pub(super) struct Vector, pub(super) fn of(known: &VectorEstimate, unit: f64) {
         pub value: [f64; 3] = (known.value * unit).into(),
         std: [f64; 3] = (known.sigma * unit).into(),
     }

@@ -1,0 +1,137 @@
+//! What a calibration came to, and the scene with it in.
+
+use std::fmt::Display;
+use std::time::SystemTime;
+
+use chrono::{DateTime, NaiveDate, Utc};
+use serde::{Deserialize, Serialize};
+
+use crate::scene::{Scene, SceneError, Setting};
+
+/// The calibrations that a recording is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CalibrationKind {
+    /// the centre of the ball in the tracked stylus
+    Tip,
+    /// weight and bias on the force sensor
+    Payload,
+    /// where the scan lies in the frame of the poses
+    Scan,
+}
+
+impl CalibrationKind {
+    /// Its name in `touchup calibrate`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tip => "tip",
+            Self::Payload => "payload",
+            Self::Scan => "scan",
+        }
+    }
+}
+
+/// The result of a calibration, as it is printed, and what it changes in a scene.
+pub trait Calibrated: Serialize + Display {
+    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they come from.
+    fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
+}
+
+/// What a calibration came to.
+#[derive(Clone, Debug)]
+pub struct Calibration<F> {
+    /// the result
+    pub found: F,
+    /// in words: what should be looked at before it is used
+    pub doubts: Vec<String>,
+    /// in words: what a better recording would not lack
+    pub losses: Vec<String>,
+}
+
+impl<F> Calibration<F> {
+    /// The same with what `of` makes of the result.
+    pub fn map<G>(self, of: impl FnOnce(F) -> G) -> Calibration<G> {
+        let Self { found, doubts, losses } = self;
+        Calibration { found: of(found), doubts, losses }
+    }
+}
+
+/// Between what a remark says and its date.
+const BEFORE_DATE: &str = "; ";
+
+/// The text of a scene with a result in it; a comment says where it comes from, and the day, UTC.
+///
+/// - `yaml`: the scene as it was.
+///
+/// # Errors
+/// [`SceneError`]: a text that is no scene, or in which it cannot be set.
+pub fn calibrated_scene(yaml: &str, found: &impl Calibrated, now: SystemTime) -> Result<String, SceneError> {
+    // without the files that it names: they are no part of the text
+    let mut expected = Scene::from_yaml(yaml)?;
+    let (settings, remark) = found.set_in(&mut expected);
+    let date = DateTime::<Utc>::from(now).date_naive();
+    Scene::edited(yaml, &settings, &format!("{remark}{BEFORE_DATE}{date}"), &expected)
+}
+
+/// The day on which a calibration was put into the text of a scene, UTC; `None` where it does not say so.
+pub fn calibrated_on(yaml: &str, kind: CalibrationKind) -> Option<NaiveDate> {
+    let key = match kind {
+        CalibrationKind::Tip => "offset_mm",
+        CalibrationKind::Payload => "mass_kg",
+        CalibrationKind::Scan => "position_mm",
+    };
+    let remark = Scene::remark(yaml, key, &format!("{}:", kind.name()))?;
+    remark.rsplit_once(BEFORE_DATE)?.1.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt;
+    use std::time::{Duration, UNIX_EPOCH};
+
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[derive(Serialize)]
+    struct LongStylus;
+
+    impl Display for LongStylus {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("125 mm")
+        }
+    }
+
+    impl Calibrated for LongStylus {
+        fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
+            scene.tip.get_or_insert_default().offset = Some(Vector3::new(0.0, 0.0, -0.125));
+            (vec![Setting::list("tip.offset_mm", &[0.0, 0.0, -125.0])], "tip: 7 poses".to_owned())
+        }
+    }
+
+    #[test]
+    fn the_day_of_a_calibration_is_read_from_its_comment_and_nothing_else_changes() {
+        let yaml = "# bench 3\ntip:\n  radius_mm: 2.5  # the long one\n";
+        // 2026-02-28, a minute before midnight, UTC
+        let now = UNIX_EPOCH + Duration::from_secs(1_772_323_140);
+        let made = calibrated_scene(yaml, &LongStylus, now).unwrap();
+        assert!(made.starts_with(yaml), "{made}");
+        assert!(made.ends_with("  offset_mm: [0, 0, -125]  # touchup calibrate tip: 7 poses; 2026-02-28\n"), "{made}");
+        assert_eq!(calibrated_on(&made, CalibrationKind::Tip), NaiveDate::from_ymd_opt(2026, 2, 28));
+        assert_eq!(calibrated_on(&made, CalibrationKind::Scan), None);
+        // one of an older version says no day, a comment of somebody else is none of ours, and the tip of an arm is another one
+        let others = [("; 2026-02-28", ""), ("touchup calibrate tip", "by hand"), ("offset_mm", "tip_position_mm")];
+        for (ours, other) in others {
+            assert_eq!(calibrated_on(&made.replace(ours, other), CalibrationKind::Tip), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn a_calibration_that_is_made_again_has_the_newer_day() {
+        let day = |days: u64| UNIX_EPOCH + Duration::from_secs(days * 86_400);
+        let first = calibrated_scene("tip:\n  radius_mm: 2.5\n", &LongStylus, day(0)).unwrap();
+        let second = calibrated_scene(&first, &LongStylus, day(31)).unwrap();
+        assert_eq!(calibrated_on(&second, CalibrationKind::Tip), NaiveDate::from_ymd_opt(1970, 2, 1));
+        assert_eq!(second.matches("touchup calibrate").count(), 1, "{second}");
+    }
+}

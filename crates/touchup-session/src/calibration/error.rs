@@ -1,0 +1,83 @@
+//! Why a calibration has no result.
+
+use std::path::PathBuf;
+
+use touchup_core::align::PairsError;
+use touchup_core::calibrate::{PayloadError, TipError};
+use touchup_core::stylus::SettingError;
+use touchup_io::table::TableError;
+
+use crate::replay::ReplayError;
+
+/// Why a calibration has no result: what is wrong with its input, and how to make a better one.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// The recording cannot be replayed.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// A parameter of the scene.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A table cannot be read.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A swing that does not determine the tip.
+    #[error("{path}: {error}", path = path.display())]
+    Tip {
+        /// the recording
+        path: PathBuf,
+        /// in words
+        error: TipError,
+    },
+    /// Static poses that do not determine the payload.
+    #[error("{path}: {error}", path = path.display())]
+    Payload {
+        /// the recording or the table
+        path: PathBuf,
+        /// in words
+        error: PayloadError,
+    },
+    /// … of an arm.
+    #[error("{}", advice(.0))]
+    PayloadOfArm(PayloadError),
+    /// Pairs that do not determine where the scan lies.
+    #[error("{path}: {error}", path = path.display())]
+    Pairs {
+        /// the table
+        path: PathBuf,
+        /// in words
+        error: PairsError,
+    },
+    /// The stylus rested on more or on fewer points than were picked on the scan.
+    #[error(
+        "{path}: {dwells} dwells of half a second in contact, and {points} points picked on the scan; they are matched in order: dwell \
+         once on each, in the order of the file",
+        path = path.display()
+    )]
+    Dwells {
+        /// the recording
+        path: PathBuf,
+        /// in the recording
+        dwells: usize,
+        /// in the table
+        points: usize,
+    },
+}
+
+/// Why the static segments of an arm do not determine its payload.
+fn advice(error: &PayloadError) -> String {
+    match error {
+        PayloadError::WrongAxes { rms_n, other_rms_n, .. } => format!(
+            "the raw wrench of this arm is not in the axes of its flange: residuals are {rms_n:.3} N, and {other_rms_n:.3} N in \
+             those of its base; identify its payload from a recording or a scale"
+        ),
+        PayloadError::NoWeight { weight_n, sigma_n } => format!(
+            "the weight is {weight_n:.3} N, no more than three times its uncertainty of {sigma_n:.3} N: nothing hangs on the \
+             flange, or the arm reports no raw wrench"
+        ),
+        PayloadError::Inconsistent { rejected, poses } => format!(
+            "{rejected} of {poses} static segments do not fit the others: the probe must touch nothing, and no hose or cable may pull it"
+        ),
+        error => error.to_string(),
+    }
+}

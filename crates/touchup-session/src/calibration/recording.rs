@@ -1,0 +1,57 @@
+//! The recordings that a calibration reads.
+
+use std::path::{Path, PathBuf};
+
+use touchup_core::stylus::{Placement, Sample, WrenchFrame};
+use touchup_io::recording::{StampSource, Topics};
+
+use crate::replay::{Recording, ReplayError, Replayed, each_sample, marker_filter};
+use crate::scene::Scene;
+
+/// A recording made for a calibration, opened.
+pub struct CalibrationRecording {
+    path: PathBuf,
+    recording: Recording,
+    /// of the markers that are read in place of the pose
+    markers_topic: Option<String>,
+}
+
+impl CalibrationRecording {
+    /// Opens a recording: a file, or a folder of rosbag2.
+    ///
+    /// # Errors
+    /// [`ReplayError::Read`]
+    pub fn open(path: &Path, topics: &Topics) -> Result<Self, ReplayError> {
+        let recording = Recording::open(path, topics, StampSource::Header)?;
+        Ok(Self { path: path.to_owned(), recording, markers_topic: topics.markers.clone() })
+    }
+
+    /// How many messages it has, where it says so.
+    pub fn message_count(&self) -> Option<u64> {
+        self.recording.message_count()
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// In which axes the wrenches are, as it says itself.
+    pub(super) fn wrench_frame(&self) -> WrenchFrame {
+        self.recording.wrench_frame
+    }
+
+    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
+    /// is.
+    ///
+    /// - `at_each`: called after each record, to show the progress.
+    pub(super) fn replay(
+        self,
+        scene: &Scene,
+        at_each: &mut dyn FnMut(),
+        each: impl FnMut(&Sample),
+    ) -> Result<Replayed, ReplayError> {
+        let markers = marker_filter(scene, self.markers_topic.as_deref())?;
+        let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
+        each_sample(self.recording, placement, scene.sync_params(), markers, at_each, &mut |_| (), each)
+    }
+}

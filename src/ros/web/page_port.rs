@@ -1,0 +1,50 @@
+//! The port of a node whose page is served: what it publishes goes to the network and to the pages.
+
+use std::sync::Arc;
+
+use super::site::Site;
+use crate::ros::port::{Port, Publication};
+
+/// Sends to the network and to the pages.
+pub(super) struct PagePort {
+    pub network: Arc<dyn Port>,
+    pub site: Arc<Site>,
+}
+
+impl Port for PagePort {
+    fn publish(&self, publication: Publication) {
+        // those are the mesh and the features again, drawn for RViz
+        if !matches!(publication, Publication::Tile(_) | Publication::FeatureMarkers(_)) {
+            self.site.board.write(publication.clone());
+        }
+        self.network.publish(publication);
+    }
+
+    fn node_name(&self) -> &str {
+        self.network.node_name()
+    }
+
+    fn sample_topics(&self) -> [&str; 2] {
+        self.network.sample_topics()
+    }
+
+    fn now_ns(&self) -> i64 {
+        self.network.now_ns()
+    }
+
+    fn dropped(&self) -> [u64; 2] {
+        self.network.dropped()
+    }
+
+    fn lost(&self) -> [u64; 2] {
+        self.network.lost()
+    }
+
+    fn unsent(&self) -> [u64; 2] {
+        self.network.unsent()
+    }
+
+    fn tiles_waiting(&self) -> usize {
+        self.network.tiles_waiting()
+    }
+}

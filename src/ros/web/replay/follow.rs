@@ -1,0 +1,70 @@
+//! One page that looks at a replay.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{Message, WebSocket};
+use tokio::time::timeout;
+
+use super::replays::{Replay, Replays};
+use super::shown::ReplayShown;
+use crate::ros::web::access::Role;
+use crate::ros::web::board::text_of;
+use crate::ros::web::connection;
+use crate::ros::web::page_place::PagePlace;
+use crate::ros::web::site::Site;
+
+/// So often a page hears that the session is still being read.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(2);
+/// A page that takes nothing for so long has gone.
+const GONE_AFTER: Duration = Duration::from_secs(20);
+
+/// Serves a page of a replay until it goes; one that there cannot be is refused with the reason.
+pub(in crate::ros::web) async fn serve(mut socket: WebSocket, replays: &Replays, session: &str) {
+    let replay = match replays.join(session) {
+        Ok(replay) => replay,
+        Err(why) => return refuse(&mut socket, session, why).await,
+    };
+    let site = match opened(&mut socket, &replay).await {
+        None => return,
+        Some(Ok(site)) => site,
+        Some(Err(why)) => return refuse(&mut socket, session, why).await,
+    };
+    match PagePlace::take(&site) {
+        None => refuse(&mut socket, session, "so many pages look at it already: close one".to_owned()).await,
+        // in a replay nobody operates
+        Some(place) => {
+            connection::serve(socket, site, Role::Look).await;
+            drop(place);
+        }
+    }
+    // it ends here where nobody else looks
+    drop(replay);
+}
+
+/// What the page is shown, once the session is read; `None`: the page has gone.
+async fn opened(socket: &mut WebSocket, replay: &Replay) -> Option<Result<Arc<Site>, String>> {
+    let mut opened = replay.opened.clone();
+    loop {
+        if let Some(found) = opened.borrow_and_update().clone() {
+            return Some(found);
+        }
+        say(socket, &replay.control.shown()).await?;
+        if let Ok(Err(_)) = timeout(SIGN_OF_LIFE, opened.changed()).await {
+            return Some(Err("there is no thread for it: end other programs".to_owned()));
+        }
+    }
+}
+
+async fn refuse(socket: &mut WebSocket, session: &str, why: String) {
+    if say(socket, &ReplayShown::refused(session, why)).await.is_some() {
+        // it may have gone meanwhile
+        let _ = timeout(GONE_AFTER, socket.send(Message::Close(None))).await;
+    }
+}
+
+/// Whether the page has taken it.
+async fn say(socket: &mut WebSocket, shown: &ReplayShown) -> Option<()> {
+    let text = text_of("replay", shown)?;
+    timeout(GONE_AFTER, socket.send(Message::text(text))).await.ok()?.ok()
+}

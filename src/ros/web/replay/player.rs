@@ -1,0 +1,167 @@
+//! Plays a session: reads it, begins a node for it, gives that its messages, and ends both when nobody looks any more.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+
+use super::control::ReplayControl;
+use super::progress::ReplayNext;
+use super::recording::SessionRecording;
+use crate::clock::Clock;
+use crate::io::session_folder::SessionFolder;
+use crate::ros::in_process::{self, OtherParticipants};
+use crate::ros::inbox::{Inbox, inbox};
+use crate::ros::node::{CELL, Node, Prepared, as_pose, as_wrench};
+use crate::ros::parameters::{ParameterValue, Parameters};
+use crate::ros::port::{Arrival, ReplayStep, SamplePort};
+use crate::ros::web::annotations::Annotations;
+use crate::ros::web::board::Board;
+use crate::ros::web::calls::Calls;
+use crate::ros::web::entrance::Entrance;
+use crate::ros::web::knowledge;
+use crate::ros::web::page_port::PagePort;
+use crate::ros::web::report_work::Reports;
+use crate::ros::web::site::{ScanShown, Site};
+use crate::session::SessionRecord;
+use crate::stylus::Message;
+
+/// Messages that wait for the node at most: a pause, and another place, are obeyed after them.
+const INBOX: usize = 256;
+/// Why it goes no further when the node is gone.
+const ENDED: &str = "the replay ended by a fault of touchup: please report it with the session's folder";
+
+/// What the pages of a replay are shown, once it is there; why there is none.
+pub(super) type OpenedReplay = Option<Result<Arc<Site>, String>>;
+
+/// What it takes to play a session.
+pub(super) struct Player {
+    pub folder: SessionFolder,
+    /// in which all sessions lie
+    pub session_folder: PathBuf,
+    pub entrance: Arc<Entrance>,
+    pub control: Arc<ReplayControl>,
+    pub runtime: Handle,
+    pub opened: watch::Sender<OpenedReplay>,
+}
+
+/// What plays.
+struct ReplayStage {
+    recording: SessionRecording,
+    site: Arc<Site>,
+    inbox: Inbox,
+    stylus: OtherParticipants,
+    node: Node,
+}
+
+impl Player {
+    /// Plays until nobody looks any more.
+    pub fn run(self) {
+        let Self { control, runtime, opened, .. } = &self;
+        let ReplayStage { recording, site, inbox, stylus, node } = match self.open() {
+            Ok(stage) => stage,
+            Err(why) => return drop(opened.send_replace(Some(Err(why)))),
+        };
+        let known = runtime.spawn(knowledge::follow(Arc::clone(&site)));
+        opened.send_replace(Some(Ok(site)));
+        if let Err(why) = play(&recording, control, &stylus) {
+            control.fail(why);
+        }
+        known.abort();
+        inbox.put(Arrival::Shutdown);
+        if let Err(error) = node.join() {
+            tracing::warn!(%error, session = control.session(), "a replay ended by a fault");
+        }
+    }
+
+    /// Reads the session, and begins a node that is to take it.
+    fn open(&self) -> Result<ReplayStage, String> {
+        let Self { folder, session_folder, entrance, control, .. } = self;
+        let record = SessionRecord::open(folder.path()).map_err(|error| error.to_string())?;
+        let SessionRecord { scan, mesh_unit, scene, recording, topics, .. } = record;
+        let source = if topics.pose.starts_with("/probe/") { "probe" } else { "stylus" };
+        let read = SessionRecording::read(recording, topics, source, || !control.is_closed());
+        let recording = read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
+        // of a session that goes on: after its messages, so that what was undone before one of them is not missing
+        let changes = SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
+        let parameters = [
+            ("scene", path(&scene)?),
+            ("scan", path(&scan)?),
+            ("mesh_unit", ParameterValue::String(mesh_unit.name().to_owned())),
+            ("source", ParameterValue::String(source.to_owned())),
+        ];
+        let mut all = Parameters::default();
+        for (name, value) in parameters {
+            all.set(name, &value).map_err(|error| error.to_string())?;
+        }
+        let left_out = changes.taken_out().len();
+        let ready = Prepared::replayed(all, folder.clone(), changes).map_err(|error| error.to_string())?;
+        let clock = Clock::system();
+        let (inbox, arrivals) = inbox(INBOX, &clock);
+        let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);
+        let scan_mesh = ready.scan_mesh();
+        let file = scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let site = Arc::new(Site {
+            board: Board::new(ready.whole_mesh()),
+            calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
+            inbox: inbox.clone(),
+            entrance: Arc::clone(entrance),
+            // none are read: features are found anew, and may get other numbers
+            annotations: Annotations::new(session_folder),
+            nominal: None,
+            reports: Reports::new(None, mesh_unit),
+            scan: ScanShown { file, faces: scan_mesh.0.face_count(), is_size_confirmed: true },
+            scan_mesh,
+            session_folder: session_folder.clone(),
+            pages: AtomicUsize::new(0),
+            replay: Some(Arc::clone(control)),
+        });
+        let port = Arc::new(PagePort { network, site: Arc::clone(&site) });
+        let node = ready.start(port, arrivals, None).map_err(|error| error.to_string())?;
+        control.begin(recording.end_ns, left_out, recording.damage.clone());
+        Ok(ReplayStage { recording, site, inbox, stylus, node })
+    }
+}
+
+/// A path as a parameter of a node.
+fn path(path: &Path) -> Result<ParameterValue, String> {
+    let text = path.to_str().ok_or_else(|| format!("{}: parameters of ROS are UTF-8, rename it", path.display()))?;
+    Ok(ParameterValue::String(text.to_owned()))
+}
+
+/// Plays from the beginning, and again whenever it is to, until nobody looks.
+fn play(recording: &SessionRecording, control: &ReplayControl, stylus: &OtherParticipants) -> Result<(), String> {
+    while play_once(recording, control, stylus)? == ReplayNext::Again {
+        step(ReplayStep::Again, stylus)?;
+    }
+    Ok(())
+}
+
+fn play_once(
+    recording: &SessionRecording,
+    control: &ReplayControl,
+    stylus: &OtherParticipants,
+) -> Result<ReplayNext, String> {
+    for timed in recording.messages().map_err(|error| error.to_string())? {
+        let (at_ns, message) = timed.map_err(|error| error.to_string())?;
+        match control.wait_for(at_ns) {
+            ReplayNext::Go => {}
+            next => return Ok(next),
+        }
+        let is_taken = match &message {
+            Message::Wrench(wrench) => stylus.publish_wrench(as_wrench(wrench, &recording.wrench_frame)),
+            Message::Pose(pose) => stylus.publish_pose(as_pose(pose, CELL)),
+        };
+        if !is_taken {
+            return Err(ENDED.to_owned());
+        }
+    }
+    step(ReplayStep::End, stylus)?;
+    Ok(control.wait_at_end())
+}
+
+fn step(step: ReplayStep, stylus: &OtherParticipants) -> Result<(), String> {
+    stylus.ask(|reply| Arrival::Replay(step, reply)).recv().map_err(|_| ENDED.to_owned())?
+}

@@ -1,0 +1,111 @@
+//! The replays that pages look at: few at a time, each for as long as one of them does.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+use tokio::runtime::Handle;
+use tokio::sync::{Semaphore, watch};
+use tokio::time::timeout;
+
+use super::control::ReplayControl;
+use super::player::{OpenedReplay, Player};
+use crate::clock::Clock;
+use crate::io::session_folder::SessionFolder;
+use crate::ros::locked;
+use crate::ros::web::background;
+use crate::ros::web::entrance::Entrance;
+
+/// Replays at a time at most: each has scan, mesh and touches in memory.
+const MOST_REPLAYS: usize = 2;
+/// One that nobody looks at any more is gone within so long.
+const GONE_WITHIN: Duration = Duration::from_secs(30);
+const BUSY: &str = "two sessions are being replayed already: close the pages of one of them";
+
+/// A replay, for as long as somebody looks at it.
+pub(super) struct Replay {
+    pub control: Arc<ReplayControl>,
+    pub opened: watch::Receiver<OpenedReplay>,
+}
+
+impl Drop for Replay {
+    fn drop(&mut self) {
+        self.control.close();
+    }
+}
+
+/// All of them.
+#[derive(Debug)]
+pub(in crate::ros::web) struct Replays {
+    entrance: Arc<Entrance>,
+    session_folder: PathBuf,
+    runtime: Handle,
+    /// by session
+    running: Mutex<BTreeMap<String, Weak<Replay>>>,
+    /// in memory, also of those that end
+    places: Arc<Semaphore>,
+}
+
+impl Replays {
+    /// None yet.
+    ///
+    /// - `session_folder`: in which sessions lie.
+    pub fn new(entrance: &Arc<Entrance>, session_folder: &Path, runtime: &Handle) -> Arc<Self> {
+        Arc::new(Self {
+            entrance: Arc::clone(entrance),
+            session_folder: session_folder.to_owned(),
+            runtime: runtime.clone(),
+            running: Mutex::default(),
+            places: Arc::new(Semaphore::new(MOST_REPLAYS)),
+        })
+    }
+
+    /// The replay of a session: that which others look at, or a new one.
+    ///
+    /// # Errors
+    /// In words: there is no such session, or there are so many replays already.
+    pub(super) fn join(&self, session: &str) -> Result<Arc<Replay>, String> {
+        let mut running = locked(&self.running);
+        running.retain(|_, replay| replay.strong_count() > 0);
+        if let Some(replay) = running.get(session).and_then(Weak::upgrade) {
+            return Ok(replay);
+        }
+        if running.len() >= MOST_REPLAYS {
+            return Err(BUSY.to_owned());
+        }
+        let folder = SessionFolder::open(&self.session_folder, session).map_err(|error| error.to_string())?;
+        let replay = self.begin(folder);
+        running.insert(session.to_owned(), Arc::downgrade(&replay));
+        Ok(replay)
+    }
+
+    fn begin(&self, folder: SessionFolder) -> Arc<Replay> {
+        let control = Arc::new(ReplayControl::new(folder.name(), Clock::system()));
+        let (to, opened) = watch::channel(None);
+        let player = Player {
+            folder,
+            session_folder: self.session_folder.clone(),
+            entrance: Arc::clone(&self.entrance),
+            control: Arc::clone(&control),
+            runtime: self.runtime.clone(),
+            opened: to,
+        };
+        let places = Arc::clone(&self.places);
+        self.runtime.spawn(async move {
+            // one that just ends has its memory still
+            let Ok(Ok(place)) = timeout(GONE_WITHIN, places.acquire_owned()).await else {
+                return drop(player.opened.send_replace(Some(Err(BUSY.to_owned()))));
+            };
+            let play = move || {
+                player.run();
+                drop(place);
+            };
+            if let Err(error) = background::begin("replay", play) {
+                // who waits sees that nothing comes any more
+                tracing::warn!(%error, "there is no thread for a replay");
+            }
+        });
+        Arc::new(Replay { control, opened })
+    }
+}

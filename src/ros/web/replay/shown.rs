@@ -1,0 +1,65 @@
+//! What pages are shown of a replay, and what they set of it.
+
+use std::ops::RangeInclusive;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Multiples of the recorded speed.
+const SPEEDS: RangeInclusive<f64> = 0.1..=100.0;
+
+/// The topic `replay`. Times are those along the recording without its long pauses, s.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(in crate::ros::web) struct ReplayShown {
+    /// name of the session
+    pub session: String,
+    /// scan and recording are read: it plays, or waits
+    pub is_ready: bool,
+    pub speed: f64,
+    pub is_paused: bool,
+    pub at_s: f64,
+    pub end_s: f64,
+    /// where it runs ahead to, as fast as it can; `None`: it plays
+    pub target_s: Option<f64>,
+    /// all has come
+    pub is_at_end: bool,
+    /// touches that were taken out in the session: they do not come
+    pub left_out: usize,
+    /// where the recording is damaged, and ends
+    pub damage: Option<String>,
+    /// why it does not go on
+    pub error: Option<String>,
+}
+
+impl ReplayShown {
+    /// There is none.
+    pub fn refused(session: &str, why: String) -> Self {
+        Self { session: session.to_owned(), error: Some(why), ..Self::default() }
+    }
+}
+
+/// The request of `~/replay`: what is left out stays as it is.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReplayRequest {
+    pub speed: Option<f64>,
+    pub is_paused: Option<bool>,
+    pub at_s: Option<f64>,
+}
+
+impl ReplayRequest {
+    /// Reads it.
+    ///
+    /// # Errors
+    /// In words: what is wrong with it.
+    pub fn read(request: Value) -> Result<Self, String> {
+        let request: Self = serde_json::from_value(request).map_err(|error| format!("~/replay: {error}"))?;
+        if let Some(speed) = request.speed.filter(|speed| !SPEEDS.contains(speed)) {
+            return Err(format!("speed is {speed}: it may be {} to {}", SPEEDS.start(), SPEEDS.end()));
+        }
+        if let Some(at_s) = request.at_s.filter(|at_s| *at_s < 0.0) {
+            return Err(format!("at_s is {at_s}: it may be 0 or more"));
+        }
+        Ok(request)
+    }
+}

@@ -1,0 +1,98 @@
+//! What was chosen so far, and what may be done then.
+
+use super::scene_draft::{SceneDraft, StatedTip};
+use super::setup_shown::{CalibrationChoice, CheckChoice, ScanChoice, SetupFailure, SetupStep, Stage, UploadShown};
+use crate::io::mesh_file::MeshUnit;
+
+/// Why something cannot be done now.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum NodeSetupError {
+    /// it comes too early or too late
+    #[error("{0}")]
+    NotNow(&'static str),
+    /// it cannot be so
+    #[error("{0}")]
+    Refused(String),
+}
+
+impl NodeSetupError {
+    pub fn refused(why: impl ToString) -> Self {
+        Self::Refused(why.to_string())
+    }
+}
+
+const STARTING: NodeSetupError = NodeSetupError::NotNow("the node is being started: wait");
+pub(super) const NO_SCAN: NodeSetupError =
+    NodeSetupError::NotNow("there is no scan yet: choose one, or wait until it is read");
+pub(super) const NO_TIP: NodeSetupError = NodeSetupError::NotNow("the tip is not stated yet");
+pub(super) const READING: NodeSetupError = NodeSetupError::NotNow("a scan is being read: wait until it is");
+const CHECKING: NodeSetupError = NodeSetupError::NotNow("a recording is being looked at: wait until it is");
+const CALIBRATING: NodeSetupError = NodeSetupError::NotNow("a calibration is being made: wait until it is");
+
+pub(super) struct SetupState {
+    pub stage: Stage,
+    /// with the calibrations that were made so far
+    pub draft: SceneDraft,
+    /// text of the scene's file as it was read or written last; empty: there is none
+    pub on_disk: String,
+    pub scan: ScanChoice,
+    pub unit: Option<MeshUnit>,
+    pub tip: Option<StatedTip>,
+    pub calibration: CalibrationChoice,
+    pub check: CheckChoice,
+    /// whether somebody has seen what it found, or does without it
+    pub is_check_over: bool,
+    pub failure: Option<SetupFailure>,
+    pub upload: Option<UploadShown>,
+}
+
+impl SetupState {
+    pub fn new(draft: SceneDraft, on_disk: String) -> Self {
+        Self {
+            stage: Stage::Choosing,
+            draft,
+            on_disk,
+            scan: ScanChoice::None,
+            unit: None,
+            tip: None,
+            calibration: CalibrationChoice::None,
+            check: CheckChoice::None,
+            is_check_over: false,
+            failure: None,
+            upload: None,
+        }
+    }
+
+    /// Whether somebody may choose.
+    pub fn require_choosing(&self) -> Result<(), NodeSetupError> {
+        if self.stage == Stage::Choosing { Ok(()) } else { Err(STARTING) }
+    }
+
+    /// Whether somebody may choose, and nothing is done beside.
+    pub fn require_idle(&self) -> Result<(), NodeSetupError> {
+        self.require_choosing()?;
+        match (&self.scan, &self.check, &self.calibration) {
+            (ScanChoice::Reading { .. }, ..) => Err(READING),
+            (_, CheckChoice::Running { .. }, _) => Err(CHECKING),
+            (.., CalibrationChoice::Running { .. }) => Err(CALIBRATING),
+            _ => Ok(()),
+        }
+    }
+
+    /// Something changed that a look at a recording depends on: it has to be made anew.
+    pub fn forget_check(&mut self) {
+        (self.check, self.is_check_over) = (CheckChoice::None, false);
+    }
+
+    /// What may have kept the node from its start was changed.
+    ///
+    /// - `mended`: where.
+    pub fn clear_failure(&mut self, mended: &[SetupStep]) {
+        self.failure.take_if(|failure| mended.contains(&failure.step) || failure.step == SetupStep::Start);
+    }
+
+    /// Nobody has to state a tip any more.
+    pub fn has_tip(&self) -> bool {
+        self.tip.is_some() || self.draft.scene.tip.is_none()
+    }
+}

@@ -1,0 +1,30 @@
+"""Copies of recordings with some of their messages."""
+
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from mcap_ros2.decoder import DecoderFactory
+
+
+def ns(stamp):
+    return stamp["sec"] * 10**9 + stamp["nanosec"]
+
+
+def copy_part(recording, out, is_kept):
+    """Copies the messages whose topic and stamp, ns, are kept of a recording, a file or the folder of a session's; how many were left out."""
+    left_out = 0
+    with open(out, "wb") as file:
+        writer, channels = Writer(file), {}
+        writer.start(profile="ros2")
+        for part in sorted(recording.glob("*.mcap")) if recording.is_dir() else [recording]:
+            reader = make_reader(part.open("rb"), decoder_factories=[DecoderFactory()])
+            for schema, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
+                if not is_kept(channel.topic, decoded.header.stamp.sec * 10**9 + decoded.header.stamp.nanosec):
+                    left_out += 1
+                    continue
+                if channel.topic not in channels:
+                    known = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, known)
+                times = message.log_time, message.data, message.publish_time, message.sequence
+                writer.add_message(channels[channel.topic], *times)
+        writer.finish()
+    return left_out
