@@ -18,10 +18,12 @@ HOLE, PLANNED, ARM_NOT_READY, STOPPED_IN_PLACE = 1, 4, 25, 50
 THROUGH = {"x": 0.016, "y": 0.036, "z": 0.012}
 # within this time after the last beat the arm stands
 STANDS_WITHIN_S = 0.2
-# tip markers come so often
-FRAME_S = 0.05
-# between two markers a tip at rest seems to move by less than this, and one that searches by more: the noise of the simulated arm
+# as the page does
+BEAT_S = 0.02
+# between two markers a tip at rest seems to move by less than this: the noise of the simulated arm
 NOISE_M = 100e-6
+# with which it brakes, m/s²
+BRAKING = 5.0
 
 
 @pytest.fixture
@@ -46,8 +48,8 @@ class Beats:
     def run(self):
         while self.is_held:
             self.page.beat()
-            self.last = time.monotonic()
-            time.sleep(0.05)
+            self.last = time.time()
+            time.sleep(BEAT_S)
 
     def let_go(self):
         self.is_held = False
@@ -68,16 +70,19 @@ def arm_of(node, condition):
         watching.take_until(lambda: condition(watching.newest.get("state", {"arm": {"motion": "", "stays_because": ""}})["arm"]))
 
 
-def order(node, hole, beats_s=0.0):
-    """Orders a probing by held beats, and lets go after some time, or when it is done; when that was, and the result of the order.
+def order(node, hole, beats_s=0.0, moves=None):
+    """Orders a probing by held beats, and lets go after some time (from when the arm moves on, where that is an event), or when it is done;
+    when that was, and the result of the order.
 
     By a page of its own, which reads all that comes and looks at its answer alone, so that no beat is late."""
     with Socket(node.url) as page:
         beats = Beats(page)
         time.sleep(0.1)
         page.socket.send('{"id": "order", "call": "~/probe_feature", "request": {"id": %d}}' % hole)
-        until = time.monotonic() + beats_s
-        answer = answer_until(page, until)
+        begun, answer = time.monotonic(), None
+        while moves and not moves.is_set() and not answer and time.monotonic() < begun + DEADLINE_S:
+            answer = answer_until(page, time.monotonic() + BEAT_S)
+        answer = answer or answer_until(page, time.monotonic() + beats_s)
         let_go = beats.let_go()
         answer = answer or answer_until(page, time.monotonic() + DEADLINE_S)
         return let_go, answer["response"]["result"]
@@ -117,7 +122,7 @@ def test_an_order_is_taken_while_the_button_is_held_and_the_arm_stays_when_it_is
 def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_while_the_button_is_held(node):
     with Socket(node.url) as page:
         hole = flagged(page)
-    places, until = [], [float("inf")]
+    places, until, moves = [], [float("inf")], threading.Event()
 
     def watch():
         with Socket(node.url) as watching:
@@ -125,19 +130,23 @@ def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_whi
                 watching.take()
                 for marker in watching.newest.get("tip", {}).get("markers", [])[:1]:
                     place = marker["pose"]["position"]
-                    places.append((time.monotonic(), numpy.array([place["x"], place["y"], place["z"]])))
+                    stamp = marker["header"]["stamp"]
+                    at = stamp["sec"] + 1e-9 * stamp["nanosec"]
+                    places.append((at, numpy.array([place["x"], place["y"], place["z"]]), time.time()))
+                    if len(places) > 1 and numpy.linalg.norm(places[-1][1] - places[-2][1]) > NOISE_M:
+                        moves.set()
 
     watcher = threading.Thread(target=watch)
     watcher.start()
     # on its way through free air
-    let_go, result = order(node, hole, beats_s=1.0)
+    let_go, result = order(node, hole, moves=moves)
     until[0] = time.monotonic() + 2
     watcher.join()
     assert result["code"] == STOPPED_IN_PLACE
-    moved = [at for (at, place), (_, before) in zip(places[1:], places) if numpy.linalg.norm(place - before) > NOISE_M]
-    stands = max(moved) - let_go
-    write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, seen by markers 33 ms apart.\n")
-    assert -0.2 < stands < STANDS_WITHIN_S + FRAME_S, stands
+    stands = stood_at(places) - let_go
+    write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, by its stamps and how far it went since a marker.\n")
+    # a beat before the last may have been late on a busy machine
+    assert -0.2 < stands < STANDS_WITHIN_S, stands
     recover(node)
     _, done = order(node, hole, beats_s=120.0)
     assert done["code"] in (1, 2) and abs(done["feature"]["diameter"] - 8e-3) < 50e-6, done
@@ -155,6 +164,21 @@ def test_an_arm_that_was_stopped_among_its_touches_goes_out_by_the_way_that_it_c
         assert planned["code"] == PLANNED, planned
     _, result = order(node, hole, beats_s=20.0)
     assert result["touch_count"] > 0, result
+
+
+def stood_at(places):
+    """When a tip stood that went straight before, by its places with their stamps and when each was seen: after the last of them at which it
+    moved it went on as fast as before, and then braked. A simulated arm on a busy machine is behind real time by no more than the
+    least time from a stamp until it was seen."""
+    places = [places[0], *(now for now, before in zip(places[1:], places) if now[0] > before[0])]
+    steps = [(now[0] - before[0], numpy.linalg.norm(now[1] - before[1])) for now, before in zip(places[1:], places)]
+    last = max(number for number, (_, way) in enumerate(steps) if way > NOISE_M)
+    speed = max(way / span for span, way in steps[last - 3 : last])
+    assert speed > 0.02, "it was on its way through free air"
+    behind = min(seen - at for at, _, seen in places[last - 3 : last + 2])
+    # braking takes v / a and half the way that this time takes at full speed
+    span, way = steps[last]
+    return places[last][0] + behind + min(way / speed + speed / (2 * BRAKING), span + speed / BRAKING)
 
 
 def recover(node):

@@ -537,7 +537,7 @@ fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it(
         let mut replay = live.begin_replay().unwrap().unwrap();
         take(&mut live, &samples[asked..made]);
         samples[..asked].iter().filter(is_left).for_each(|sample| replay.push(sample));
-        live.end_replay(Some(replay)).unwrap();
+        assert_eq!(live.end_replay(Some(replay)).unwrap(), 0, "all that came meanwhile was kept");
         assert!(live.is_replacing());
         take(&mut live, &samples[made..]);
         let mut never = engine(&stream, Pace::default(), Gate::default());

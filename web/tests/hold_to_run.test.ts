@@ -1,4 +1,4 @@
-/** Beats come each 50 ms while the button is held, and end with everything that makes it doubtful that a hand is on it. */
+/** Beats come each 20 ms while the button is held, and end with everything that makes it doubtful that a hand is on it. */
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { BEAT, HoldToRun } from "../src/hold_to_run";
 
@@ -42,7 +42,7 @@ afterEach(() => {
 const press = (): void => void button.dispatchEvent(event("pointerdown"));
 
 describe("while it is held", () => {
-  it("a beat goes out at once and each 50 ms, numbered", () => {
+  it("a beat goes out at once and each 20 ms, numbered", () => {
     press();
     vi.advanceTimersByTime(4 * BEAT);
     expect(beats).toEqual([1, 2, 3, 4, 5]);

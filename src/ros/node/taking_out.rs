@@ -19,6 +19,14 @@ use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
 use crate::session::{EvidenceSource, StrokeChange, StrokeChanges};
 
+/// Why a touch stays where it is: without the samples that came meanwhile the others would not be what they are.
+fn too_many(dropped: u64) -> String {
+    format!(
+        "{dropped} samples came while the touches were made again, more than are kept meanwhile, so nothing was changed: pause the samples \
+         (~/pause) and call again"
+    )
+}
+
 impl RefinementWorker {
     /// Answers `~/take_out_touch`: now, or when the mesh shows it.
     pub(super) fn take_out_touch(&mut self, request: &TakeOutTouchRequest, reply: Reply<TakeOutTouchResponse>) {
@@ -96,11 +104,16 @@ impl RefinementWorker {
             Ok(Remade { evidence, change, answer }) => (Some(evidence), Ok((change, answer))),
             Err(message) => (None, Err(message)),
         };
-        if let Err(error) = self.session.engine.end_replay(evidence) {
+        let dropped = self.session.engine.end_replay(evidence).map_err(|error| {
             self.fail(&error);
-            return Err(error.to_string());
-        }
+            error.to_string()
+        })?;
         let (change, answer) = made?;
+        if dropped > 0 {
+            let why = too_many(dropped);
+            warn!("{why}");
+            return Err(why);
+        }
         self.note_stroke(change);
         self.session.version += 1;
         Ok(answer)

@@ -29,7 +29,7 @@ const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
 const GONE_AFTER: Duration = Duration::from_secs(20);
 /// Answers that wait for a page at most.
 const MOST_ANSWERS: usize = 64;
-/// Messages of a page within a second, at most: a beat comes 20 times.
+/// Messages of a page within a second, at most: a beat comes 50 times.
 const MOST_PER_SECOND: u32 = 200;
 /// Kind of a binary message: a `MeshPatch`.
 const MESH_PATCH: u8 = 1;

@@ -11,6 +11,7 @@ mod detail;
 mod error;
 mod evidence_replay;
 mod gate;
+mod kept_samples;
 mod latency;
 mod probed;
 mod renewals;
@@ -25,6 +26,7 @@ use detail::Detail;
 pub use error::LiveError;
 pub use evidence_replay::EvidenceReplay;
 pub use gate::{Gate, GateKeeper};
+use kept_samples::KeptSamples;
 pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
@@ -65,7 +67,7 @@ pub struct Engine {
     /// of the patch beside the samples
     patch_params: Option<PatcherParams>,
     /// samples since [`Self::begin_replay`]
-    since_replay: Option<Vec<Sample>>,
+    since_replay: Option<KeptSamples>,
     /// touch-down of the stroke that was taken back or done again last, ns
     changed_stroke_ns: Option<i64>,
 }
@@ -152,7 +154,7 @@ impl Engine {
         self.follow()?;
         let update = self.refiner.push(sample)?;
         self.answered = self.refiner.contact().copied();
-        self.since_replay.iter_mut().for_each(|since| since.push(*sample));
+        self.since_replay.iter_mut().for_each(|since| since.push(sample));
         Ok(update)
     }
 
@@ -276,7 +278,8 @@ impl Engine {
     }
 
     /// Begins to make the evidence again beside the samples: what is returned takes all samples so far but those to be left out, on any
-    /// thread, and comes back with [`Self::end_replay`]. Until then the samples are kept. `None` without a patch beside them.
+    /// thread, and comes back with [`Self::end_replay`]. Until then the samples are kept, as far as there is room for
+    /// them. `None` without a patch beside them.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
@@ -284,24 +287,29 @@ impl Engine {
         let Some(patch) = self.patch_params else { return Ok(None) };
         self.follow()?;
         let replay = EvidenceReplay::new(self.refiner.fresh_contacts()?, patch)?;
-        self.since_replay = Some(Vec::new());
+        self.since_replay = Some(KeptSamples::default());
         Ok(Some(replay))
     }
 
     /// Evidence and estimates become those of `replay` and of the samples since it was begun, as if there had never been others; `None`
     /// leaves them. The mesh follows with the next calls, see [`Self::is_replacing`]. Never waits for the patch.
     ///
+    /// Returns how many samples came since it was begun where they were too many to be kept: they are left as well then. Else 0.
+    ///
     /// # Errors
     /// [`LiveError::Stopped`].
-    pub fn end_replay(&mut self, replay: Option<EvidenceReplay>) -> Result<(), LiveError> {
+    pub fn end_replay(&mut self, replay: Option<EvidenceReplay>) -> Result<u64, LiveError> {
         self.follow()?;
         let since = self.since_replay.take().unwrap_or_default();
-        let (Some(mut replay), Reconstruction::Beside(renewals)) = (replay, &mut self.patch) else { return Ok(()) };
-        since.iter().for_each(|sample| replay.push(sample));
+        let (Some(mut replay), Reconstruction::Beside(renewals)) = (replay, &mut self.patch) else { return Ok(0) };
+        match since.all() {
+            Ok(samples) => samples.iter().for_each(|sample| replay.push(sample)),
+            Err(dropped) => return Ok(dropped),
+        }
         let EvidenceReplay { contacts, patcher } = replay;
         let last_ns = self.refiner.contact().map_or(i64::MIN, |contact| contact.tip.stamp_ns);
         self.refiner.set_contacts(contacts);
-        renewals.replace(patcher, last_ns)
+        renewals.replace(patcher, last_ns).map(|()| 0)
     }
 
     /// Whether the mesh does not show yet what [`Self::end_replay`] has put in place.

@@ -1,12 +1,14 @@
 mod command;
 mod interrupted;
+mod opened;
 mod planning;
 mod sliding;
+mod static_scan;
 mod uncertainty;
 mod way_out;
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
-pub use planning::StaticScan;
+pub use static_scan::StaticScan;
 
 use nalgebra::Point3;
 use touchup::probing::arm::{Limits, TouchParams};

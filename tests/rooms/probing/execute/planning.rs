@@ -8,91 +8,20 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use touchup::features::Kind;
 use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
-use touchup::mesh::{FaceHit, FaceTree, TriMesh};
+use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
     Arm, ArmGeometry, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry,
 };
 use touchup::probing::execute::{
-    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, ProbedTouch, Prober, Progress, Tool, World, plan,
+    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
 
+use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::chains::seven_joints;
 use crate::plate_stream::plate_scan;
-
-/// A mesh that stays unchanged.
-pub struct StaticScan {
-    mesh: TriMesh,
-    tree: FaceTree,
-    /// cancels after this many states
-    patience: Option<usize>,
-    /// has it stay where it is after this many, and when that was, ns
-    stays_after: Option<usize>,
-    stayed_ns: i64,
-    seen: usize,
-    touches: Vec<usize>,
-    /// as they were made
-    made: Vec<ProbedTouch>,
-    /// what the mesh becomes when more than 2 N is measured
-    after: Option<TriMesh>,
-    /// height of the tip in B when it was wanted to end, and the least since then, m
-    since_then: Option<[f64; 2]>,
-}
-
-impl StaticScan {
-    pub fn new(mesh: TriMesh) -> Self {
-        let tree = FaceTree::new(&mesh);
-        let (patience, stays_after, stayed_ns) = (None, None, 0);
-        let (seen, touches, made, after, since_then) = (0, Vec::new(), Vec::new(), None, None);
-        Self { mesh, tree, patience, stays_after, stayed_ns, seen, touches, made, after, since_then }
-    }
-}
-
-impl Observer for StaticScan {
-    fn on_state(&mut self, state: &ArmState) {
-        self.seen += 1;
-        if state.wrench_b.force.norm() > 2.0
-            && let Some(after) = self.after.take()
-        {
-            self.tree = FaceTree::new(&after);
-            self.mesh = after;
-        }
-        if Some(self.seen) == self.stays_after {
-            self.stayed_ns = state.stamp_ns;
-        }
-        let z = state.pose_bt.translation.z;
-        if self.stop_request().is_some() {
-            let [first, least] = self.since_then.unwrap_or([z; 2]);
-            self.since_then = Some([first, least.min(z)]);
-        }
-    }
-
-    fn stop_request(&self) -> Option<StopRequest> {
-        let is_over = |patience: Option<usize>| patience.is_some_and(|patience| self.seen > patience);
-        let request = is_over(self.patience).then_some(StopRequest::Retract);
-        if is_over(self.stays_after) { Some(StopRequest::Stay) } else { request }
-    }
-}
-
-impl World for StaticScan {
-    fn mesh(&self) -> &TriMesh {
-        &self.mesh
-    }
-
-    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.tree.closest(&self.mesh, place, reach)
-    }
-
-    fn publish(&mut self, progress: &Progress) {
-        self.touches.push(progress.touch);
-    }
-
-    fn touched(&mut self, _: u32, touch: &ProbedTouch) {
-        self.made.push(touch.clone());
-    }
-}
 
 const HOLE: Flag = Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(17e-3, 35e-3, 12e-3), radius: 3e-3 };
 

@@ -2,12 +2,11 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
-use touchup::mesh::{FaceHit, TriMesh};
-use touchup::probing::arm::{Arm, ArmState, Command, Observer, StopRequest};
-use touchup::probing::execute::{Cell, Ending, Flag, Prober, Progress, WayOut, World, plan};
-use touchup::sim::{ArmParams, Plate, SimArm, Surface};
+use touchup::probing::arm::{Arm, Command, StopRequest};
+use touchup::probing::execute::{Ending, Flag, Prober, WayOut, plan};
+use touchup::sim::{ArmParams, Plate, SimArm};
 
-use super::planning::StaticScan;
+use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
 
@@ -17,46 +16,9 @@ const TOP: f64 = 12e-3;
 /// After so many states the arm is stopped: some of them are inside of the hole.
 const STOPS: [usize; 7] = [3000, 5000, 6011, 7222, 8433, 9644, 11055];
 
-/// Has the arm stay where it is after some states, and sees how near the ball comes to the true part.
-struct Stopping {
-    scan: StaticScan,
-    plate: Plate,
-    cell: Cell,
-    stays_after: usize,
-    seen: usize,
-    nearest: f64,
-}
-
-impl Stopping {
-    fn new(stays_after: usize) -> Self {
-        let (scan, plate) = (StaticScan::new(plate_scan(1)), Plate::default());
-        Self { scan, plate, cell: cell(), stays_after, seen: 0, nearest: f64::INFINITY }
-    }
-}
-
-impl Observer for Stopping {
-    fn on_state(&mut self, state: &ArmState) {
-        self.seen += 1;
-        self.nearest = self.nearest.min(self.plate.signed_distance(&self.cell.place(&state.pose_bt)));
-    }
-
-    fn stop_request(&self) -> Option<StopRequest> {
-        (self.seen > self.stays_after).then_some(StopRequest::Stay)
-    }
-}
-
-impl World for Stopping {
-    fn mesh(&self) -> &TriMesh {
-        self.scan.mesh()
-    }
-
-    fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.scan.closest_face(place, reach)
-    }
-
-    fn publish(&mut self, progress: &Progress) {
-        self.scan.publish(progress);
-    }
+/// The plate and its scan; the arm is to stay where it is after some states.
+fn stopping(stays_after: Option<usize>) -> StaticScan {
+    StaticScan { stays_after, part: Some(Plate::default()), ..StaticScan::new(plate_scan(1)) }
 }
 
 fn arm(plate: &Plate) -> SimArm<'_> {
@@ -66,7 +28,7 @@ fn arm(plate: &Plate) -> SimArm<'_> {
 
 /// Probes until it is stopped after some states; where the ball stands then, and the way out of there.
 fn stopped(arm: &mut SimArm, stays_after: usize) -> (Point3<f64>, Option<WayOut>) {
-    let (cell, params, mut world) = (cell(), params(), Stopping::new(stays_after));
+    let (cell, params, mut world) = (cell(), params(), stopping(Some(stays_after)));
     let mut prober = Prober::new(arm, &cell, &params, &mut world);
     let probed = prober.probe(&HOLE);
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay), "{stays_after}");
@@ -90,7 +52,7 @@ fn is_inside(place: &Point3<f64>) -> bool {
 
 /// Probes on from there, to its end.
 fn goes_on(arm: &mut SimArm, way_out: Option<WayOut>) -> (Ending, f64) {
-    let (cell, params, mut world) = (cell(), params(), Stopping::new(usize::MAX));
+    let (cell, params, mut world) = (cell(), params(), stopping(None));
     let probed = Prober::new(arm, &cell, &params, &mut world).leaving_by(way_out).probe(&HOLE);
     let found = probed.found.and_then(|found| found.feature).and_then(|hole| hole.diameter);
     assert!(found.as_ref().is_none_or(|diameter| (diameter.value - 8e-3).abs() < 50e-6), "{found:?}");
@@ -142,7 +104,7 @@ fn an_arm_that_was_moved_since_it_was_stopped_does_not_go_by_a_way_that_begins_e
 fn a_way_out_that_is_broken_off_remains_from_where_it_was() {
     let plate = Plate::default();
     let (mut arm, place, way_out) = stopped_inside(&plate);
-    let (cell, params, mut world) = (cell(), params(), Stopping::new(60));
+    let (cell, params, mut world) = (cell(), params(), stopping(Some(60)));
     let mut prober = Prober::new(&mut arm, &cell, &params, &mut world).leaving_by(Some(way_out));
     let probed = prober.probe(&HOLE);
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay));

@@ -10,6 +10,7 @@ mod dry_run;
 mod ending;
 mod feature_probing;
 mod links;
+mod opening_surface;
 mod payload;
 mod prober;
 mod repeat;

@@ -7,6 +7,7 @@ use nalgebra::{Point3, UnitQuaternion};
 use super::cell::Cell;
 use super::ending::Ending;
 use super::links::{Clearance, LinkError, Tool};
+use super::opening_surface::on_surface_around;
 use super::route::FreeSpace;
 use super::way_out::WayOut;
 use super::world::{World, distance, normal_about, on_mesh};
@@ -75,9 +76,16 @@ impl Flag {
         world: &dyn World,
         now: &ArmState,
     ) -> Result<(Explorer, UnitQuaternion<f64>), ExploreError> {
-        let place = on_mesh(world, &self.place);
-        let normal = normal_about(world, &place, &cell.shaft(&now.pose_bt.rotation));
         let pattern = PatternParams { flag_radius: self.radius, ..params.pattern };
+        let nearest = on_mesh(world, &self.place);
+        let normal = normal_about(world, &nearest, &cell.shaft(&now.pose_bt.rotation));
+        let (place, normal) = match self.kind {
+            Some(Kind::Hole | Kind::Slot | Kind::Pocket) => {
+                let ball = pattern.ball_radius;
+                on_surface_around(world.mesh(), &self.place, [self.radius + ball, ball], (nearest, normal))
+            }
+            _ => (nearest, normal),
+        };
         let explorer = Explorer::new(self.kind, &place, &normal, pattern, world.mesh())?;
         let explorer = match params.goals.get(&self.id) {
             Some(goal) => explorer.until_decided(goal.clone()),
