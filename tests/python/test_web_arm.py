@@ -145,8 +145,8 @@ def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_whi
     assert result["code"] == STOPPED_IN_PLACE
     stands = stood_at(places) - let_go
     write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, by its stamps and how far it went since a marker.\n")
-    # a beat before the last may have been late on a busy machine
-    assert -0.2 < stands < STANDS_WITHIN_S, stands
+    # before the last beat: one before it was late, and the arm stopped for that
+    assert 0.0 < stands < STANDS_WITHIN_S, stands
     recover(node)
     _, done = order(node, hole, beats_s=120.0)
     assert done["code"] in (1, 2) and abs(done["feature"]["diameter"] - 8e-3) < 50e-6, done
