@@ -1,10 +1,12 @@
 """The inspection report that an operator's page makes of a session: against `touchup inspect` on the same folder, and who may have one."""
 
+import csv
 import http.client
 import json
 import shutil
 from urllib.parse import quote, urlencode, urlsplit
 
+import numpy
 import pytest
 from browser import DESKTOP, LANDSCAPE, PORTRAIT
 from conftest import ROOT
@@ -83,6 +85,29 @@ def test_a_report_of_the_nodes_nominal_part_is_that_of_the_command(touched, touc
     flags = ["--nominal", touched.part, "--general", "iso2768-f", "--position-mm", "0.2", "--confidence", "0.9"]
     assert without_date(found) == without_date(by_command(touchup, touched.session, *flags))
     assert found["confidence"] == 0.9
+
+
+def test_a_drawing_that_lies_elsewhere_is_fit_to_the_part_as_the_command_does(touched, touchup):
+    # the drawing turned by half a turn about z: x and y, and axes along them, change their signs
+    with DRAWING.open() as file:
+        lines = csv.DictReader(line for line in file if not line.startswith("#"))
+        turned = [{name: turned_about_z(name, value) for name, value in line.items()} for line in lines]
+    elsewhere = touched.session.parent / "elsewhere.csv"
+    with elsewhere.open("w") as file:
+        writer = csv.DictWriter(file, turned[0])
+        writer.writeheader()
+        writer.writerows(turned)
+    found = made(touched, {"nominal": "upload", "file": "elsewhere.csv", "align": "best-fit"}, elsewhere.read_bytes())
+    expected = by_command(touchup, touched.session, "--nominal", elsewhere, "--align", "best-fit")
+    expected["files"][0]["path"] = "elsewhere.csv"
+    assert without_date(found) == without_date(expected)
+    assert numpy.abs(numpy.array(found["alignment"]["rotation"]) - numpy.diag([-1, -1, 1])).max() < 0.02
+
+
+def turned_about_z(name, value):
+    """A field of a drawing that is turned by half a turn about z."""
+    is_turned = name in ("center_x_mm", "center_y_mm", "axis_x", "axis_y", "datum_x_mm", "datum_y_mm")
+    return f"{-float(value)}" if is_turned and value else value
 
 
 @pytest.mark.parametrize("name", ["drawing.csv", "part.ply"])

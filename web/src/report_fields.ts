@@ -12,6 +12,8 @@ const CLASSES: Array<[string, TextKey]> = [
 ];
 /** Of a CAD mesh, until somebody chooses another one. */
 const FOR_MESHES = "iso2768-m";
+/** Of the drawing to the part. */
+const ALIGNMENTS: Array<[string, TextKey]> = [["", "alignNone"], ["best-fit", "alignBestFit"]];
 const RULES: Array<[string, TextKey]> = [["iso14253", "ruleGuardBands"], ["simple", "ruleSimple"]];
 /** Of the rule, percent: that of ISO 14253-1. */
 const CONFIDENCE = "95";
@@ -21,6 +23,7 @@ export class ReportFields {
   private readonly nominal = el("select", { id: "report-nominal" });
   private readonly file = el("input", { id: "report-file", attributes: { type: "file", accept: ".csv,.json,.ply,.stl,.obj" } });
   private readonly unit = select("report-unit", UNITS.map((unit) => [unit, null]));
+  private readonly align = select("report-align", ALIGNMENTS);
   private readonly general = select("report-general", CLASSES);
   private readonly rule = select("report-rule", RULES);
   private readonly confidence = text("report-confidence", CONFIDENCE);
@@ -40,6 +43,7 @@ export class ReportFields {
       field("reportNominal", this.nominal),
       this.fileField,
       this.unitField,
+      field("reportAlign", this.align),
       field("reportGeneral", this.general),
       field("reportPart", this.part),
       field("reportSerial", this.serial),
@@ -72,6 +76,7 @@ export class ReportFields {
       nominal: this.nominal.value as NominalFrom,
       file: this.file.files?.[0] ?? null,
       unit: this.unit.value,
+      align: this.align.value,
       general: this.general.value,
       rule: this.rule.value,
       confidence: this.confidence.value,

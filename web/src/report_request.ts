@@ -10,6 +10,8 @@ export interface ReportForm {
   file: File | null;
   /** Of a mesh that is handed in. */
   unit: string;
+  /** "" where the drawing is in the frame of the scan. */
+  align: string;
   /** "" where the drawing alone counts. */
   general: string;
   rule: string;
@@ -34,6 +36,7 @@ export function asked(form: ReportForm): string {
     nominal: isUpload || nominal === "part" ? nominal : "session",
     file: isUpload ? (file?.name ?? "") : nominal === "part" ? "" : nominal,
     unit: isUpload && isMesh(file?.name ?? "") ? form.unit : "",
+    align: form.align,
     general: form.general,
     rule: form.rule,
     confidence: form.confidence.trim() === "" ? "" : String(Number(share.toFixed(9))),

@@ -7,7 +7,7 @@ function characteristic(number: string, decision: Decision, probability?: number
 }
 
 const FORM: ReportForm = {
-  nominal: "upload", file: null, unit: "mm", general: "", rule: "iso14253", confidence: "95", part: " Plate & co ", serial: "", operator: "Ö",
+  nominal: "upload", file: null, unit: "mm", align: "", general: "", rule: "iso14253", confidence: "95", part: " Plate & co ", serial: "", operator: "Ö",
 };
 
 describe("an inspection on the page", () => {
@@ -42,6 +42,7 @@ describe("what is asked of a report", () => {
     expect(asked({ ...FORM, file: { name: "plate.STL" } as File, unit: "inch" })).toContain("unit=inch");
     expect(isMesh("plate.csv")).toBe(false);
     expect(asked({ ...FORM, nominal: "nominal.json" })).toContain("nominal=session&file=nominal.json");
+    expect(asked({ ...FORM, nominal: "part", align: "best-fit" })).toMatch(/^nominal=part&align=best-fit/);
     expect(asked({ ...FORM, nominal: "part", general: "iso2768-m" })).toMatch(/^nominal=part&general=iso2768-m/);
   });
 });

@@ -15,7 +15,7 @@ pub type VertexVariance = (u32, f32);
 pub struct Variances {
     /// state of the mesh with these in it
     pub version: u64,
-    /// …
+    /// of which vertices
     pub of: Vec<VertexVariance>,
 }
 
