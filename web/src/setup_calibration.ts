@@ -7,7 +7,7 @@ import { button, el, write } from "./dom";
 import { locale, t } from "./language";
 import { bytes, percent } from "./numbers";
 import { type CalibrationName, type CalibrationChoice, changeSetup, type SetupFile, type SetupState, sendFile } from "./setup_state";
-import type { SetupDesk, SetupStep } from "./setup_step";
+import { refusalWords, type SetupDesk, type SetupStep } from "./setup_step";
 import type { TextKey } from "./texts";
 
 const CALIBRATIONS: Record<CalibrationName, { title: TextKey; cost: TextKey; how: TextKey; command: string }> = {
@@ -138,7 +138,7 @@ export class CalibrationCard {
     let words = "";
     if (sent !== null) words = t("scanSending", { file: sent.file, share: percent(sent.share) });
     else if (own?.state === "running") words = t("calibrationRunning", { file: own.file });
-    else if (own?.state === "refused") words = t("scanRefused", { file: own.file, reason: own.why });
+    else if (own?.state === "refused") words = refusalWords(own.file, own.why);
     this.progress.setAttribute("aria-label", words);
     write(this.status, words);
     this.status.classList.toggle("fix", sent === null && own?.state === "refused");

@@ -3,7 +3,7 @@ import { button, el, say, write } from "./dom";
 import { t } from "./language";
 import { CalibrationCard } from "./setup_calibration";
 import { type CheckFinding, changeSetup, type SetupFile, type SetupState } from "./setup_state";
-import { type SetupDesk, SetupStep } from "./setup_step";
+import { refusalWords, type SetupDesk, SetupStep } from "./setup_step";
 import type { TextKey } from "./texts";
 
 /** In the order in which they are made. */
@@ -55,7 +55,7 @@ export class CheckStep extends SetupStep {
     this.status.classList.toggle("fix", check.state === "refused");
     write(this.status, "");
     if (check.state === "running") write(this.status, t("recordingRunning", { file: check.file }));
-    if (check.state === "refused") write(this.status, t("scanRefused", { file: check.file, reason: check.why }));
+    if (check.state === "refused") write(this.status, refusalWords(check.file, check.why));
     say(this.overWords, check.state === "found" ? "checkOver" : "checkWithout");
     this.over.disabled = !mayChange;
     // the same again touches nothing, so that who is on a button stays there

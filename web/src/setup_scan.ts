@@ -3,7 +3,7 @@ import { button, el, write } from "./dom";
 import { locale, t } from "./language";
 import { bytes, percent } from "./numbers";
 import { changeSetup, sendScan, type SetupFile, type SetupState } from "./setup_state";
-import { type SetupDesk, SetupStep } from "./setup_step";
+import { refusalWords, type SetupDesk, SetupStep } from "./setup_step";
 
 /** What a device offers to choose from. */
 const ACCEPTED = ".ply,.stl,.obj,.pcd,.xyz,.txt,.asc,.e57";
@@ -75,7 +75,7 @@ export class ScanStep extends SetupStep {
       this.progress.setAttribute("aria-label", words);
       write(this.status, words);
     } else if (scan.state === "reading") write(this.status, t("scanReading", { file: scan.file }));
-    else if (scan.state === "refused") write(this.status, t("scanRefused", { file: scan.file, reason: scan.why }));
+    else if (scan.state === "refused") write(this.status, refusalWords(scan.file, scan.why));
     else write(this.status, "");
     this.status.classList.toggle("fix", sent === null && scan.state === "refused");
   }

@@ -76,3 +76,9 @@ export abstract class SetupStep {
     this.element.scrollIntoView({ block: "nearest" });
   }
 }
+
+/** That a file cannot be used, and why; reasons of the program may name the file themselves. */
+export function refusalWords(file: string, why: string): string {
+  const named = `${file}: `;
+  return t("scanRefused", { file, reason: why.startsWith(named) ? why.slice(named.length) : why });
+}
