@@ -333,7 +333,7 @@ def test_the_page_says_that_it_is_a_replay_and_offers_nothing_else(browser, touc
         wait_until(page, "window.touchup !== undefined && touchup.session() === 'one#1' && touchup.tip() !== null")
         assert page.get_by_text("Nothing here acts on the session that runs, or on an arm.").is_visible()
         assert page.get_by_text("Touches that were taken out do not come: 1.").is_visible()
-        for name in ["Undo", "Redo", "Save", "New session", "Report", "Hold to run", "Another device", "Approve the plan"]:
+        for name in ["Undo", "Redo", "Detect", "Save", "New session", "Report", "Hold to run", "Another device", "Approve the plan"]:
             assert page.get_by_role("button", name=name).count() == 0 or page.get_by_role("button", name=name).is_hidden(), name
         page.get_by_role("button", name="4 times").click()
         page.locator("button[aria-pressed=true]", has_text="4").wait_for()

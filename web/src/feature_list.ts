@@ -34,6 +34,8 @@ export class FeatureList {
     onFilter: () => void,
   ) {
     const detect = button("search", "detect", () => void operating.call("~/detect_features", {}, (answer) => answer.message));
+    // a replay finds them by itself
+    detect.hidden = model.replayed !== null;
     this.all.checked = settings.showsAll;
     this.all.addEventListener("change", () => {
       keep({ showsAll: this.all.checked });
