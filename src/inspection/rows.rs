@@ -149,7 +149,7 @@ fn found_feature<'a>(matched: &FeatureMatch, file: &'a FeatureFile) -> Option<&'
 }
 
 /// Why a feature of the drawing has none that was measured.
-fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord) -> String {
+fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord, is_aligned: bool) -> String {
     let place =
         |center: Option<[f64; 3]>| center.map_or(String::new(), |[x, y, z]| format!(" near ({x:.1} {y:.1} {z:.1}) mm"));
     match matched {
@@ -157,10 +157,8 @@ fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord) -> Strin
             format!("there is no {kind} {}: see the ids in the features", nominal.feature.unwrap_or_default())
         }
         FeatureMatch::Missing => {
-            format!(
-                "no {kind} was found{}: touch it, and check that drawing and mesh share one frame (or use --align)",
-                place(nominal.center_mm)
-            )
+            let or = if is_aligned { "" } else { ", or align drawing and mesh where they do not share a frame" };
+            format!("no {kind} was found{}: touch it{or}", place(nominal.center_mm))
         }
         FeatureMatch::Ambiguous(ids) => {
             let ids = ids.iter().map(u32::to_string).collect::<Vec<_>>().join(" and ");
@@ -187,12 +185,12 @@ fn characteristic(
     let feature = found_feature(matched, file);
     let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
     let measured = match (feature, datum, datum_feature) {
-        (None, ..) => missing(why_not(matched, &nominal.kind, nominal)),
+        (None, ..) => missing(why_not(matched, &nominal.kind, nominal, params.align.is_some())),
         (Some(_), Some(datum), None) => {
             let record = nominal.datum.clone().unwrap_or_default();
             let as_nominal =
                 NominalRecord { center_mm: record.center_mm, feature: record.feature, ..NominalRecord::default() };
-            missing(format!("datum: {}", why_not(datum, &record.kind, &as_nominal)))
+            missing(format!("datum: {}", why_not(datum, &record.kind, &as_nominal, params.align.is_some())))
         }
         (Some(feature), ..) => {
             let kind = nominal.kind().unwrap_or_default();

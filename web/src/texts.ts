@@ -68,7 +68,7 @@ export const texts = {
   reportUnit: ["Unit of the CAD mesh", "Einheit des CAD-Netzes", "Unidad de la malla CAD"],
   reportAlign: ["The drawing lies", "Die Zeichnung liegt", "El plano está"],
   alignNone: ["as the scan does", "wie der Scan", "como el escaneo"],
-  alignBestFit: ["elsewhere: fit it to all touched features", "anders: an alle angetasteten Merkmale anpassen", "en otro sitio: ajustarlo a todo lo tocado"],
+  alignBestFit: ["elsewhere: fit the features", "anders: Merkmale einpassen", "en otro sitio: ajustarlo"],
   reportGeneral: ["General tolerance (ISO 2768‑1)", "Allgemeintoleranz (ISO 2768‑1)", "Tolerancia general (ISO 2768‑1)"],
   generalNone: ["none: only those of the drawing", "keine: nur die der Zeichnung", "ninguna: solo las del plano"],
   generalFine: ["f (fine)", "f (fein)", "f (fina)"],

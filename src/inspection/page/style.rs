@@ -14,6 +14,7 @@ h3 { font-size: 10.5pt; margin: 5mm 0 1.5mm; break-after: avoid; }
 p { margin: 0 0 2mm; }
 .small { font-size: 8pt; color: #4a5160; }
 table { border-collapse: collapse; width: 100%; font-size: 8.5pt; line-height: 1.3; }
+table + table { margin-top: 4mm; }
 thead { display: table-header-group; }
 tr { break-inside: avoid; }
 th { text-align: left; font-weight: 600; color: #4a5160; border-bottom: .3mm solid #1d2129; padding: 1mm 1.4mm; vertical-align: bottom; }
