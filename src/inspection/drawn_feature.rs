@@ -36,7 +36,7 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
     let size = |value: Option<f64>, name: &str| Some(measured(value? * 1e-3, std(name, 1e-3)));
     Some(Feature {
         id: record.id,
-        kind: kind_of(&record.kind)?,
+        kind: Kind::of_name(&record.kind)?,
         centre: measured(Point3::from(record.center_mm?) * 1e-3, std("center_mm", 1e-3)),
         axis: record.axis.map(|axis| measured(Vector3::from(axis), std("axis_deg", 1f64.to_radians()))),
         direction: record.direction.map(Vector3::from),
@@ -48,11 +48,6 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
         is_convex: record.convex,
         ..Feature::default()
     })
-}
-
-/// The kind of a name.
-pub(super) fn kind_of(name: &str) -> Option<Kind> {
-    Kind::ALL.into_iter().find(|kind| kind.name() == name)
 }
 
 /// A number or place with its standard uncertainty.

@@ -86,7 +86,7 @@ impl InspectionParams {
 /// # Errors
 /// In words: the names that there are.
 pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
-    let class = GeneralTolerance::ALL.into_iter().find(|class| class.name() == name);
+    let class = GeneralTolerance::of_name(name);
     class.ok_or_else(|| format!("take one of {}", GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")))
 }
 
@@ -95,6 +95,6 @@ pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
 /// # Errors
 /// As [`general_tolerance`].
 pub fn decision_rule(name: &str) -> Result<DecisionRule, String> {
-    let rule = DecisionRule::ALL.into_iter().find(|rule| rule.name() == name);
+    let rule = DecisionRule::of_name(name);
     rule.ok_or_else(|| format!("take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
 }

@@ -8,7 +8,6 @@ use nalgebra::{Point3, Vector3};
 
 use super::alignment::{Alignment, aligned};
 use super::drawing::{Drawn, PartDrawing};
-use super::drawn_feature::kind_of;
 use super::measured::{CharacteristicMeasurement, measurement};
 use super::source::InspectionSource;
 use super::words::first_few;
@@ -16,6 +15,7 @@ use super::{InspectionError, InspectionParams};
 use crate::conformity::{
     Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess, match_features,
 };
+use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{CharacteristicRecord, InspectionRecord};
 use crate::io::machine::VERSION;
@@ -133,7 +133,13 @@ fn point(mm: [f64; 3]) -> Point3<f64> {
 fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
     let size = feature.diameter_mm.or(feature.width_mm).map(|mm| mm * 1e-3);
     let axis = feature.axis.map(Vector3::from);
-    Some(FeaturePlace { id: feature.id, kind: kind_of(&feature.kind)?, centre: point(feature.center_mm?), axis, size })
+    Some(FeaturePlace {
+        id: feature.id,
+        kind: Kind::of_name(&feature.kind)?,
+        centre: point(feature.center_mm?),
+        axis,
+        size,
+    })
 }
 
 fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {

@@ -156,7 +156,7 @@ export async function changeSetup(what: SetupStepName | "calibrate" | "use" | "l
   return answered<SetupState>(answer.ok, await answer.text());
 }
 
-/** Sends a scan, which is chosen then; `onProgress` is told the share that has gone. */
+/** Sends a scan, which is chosen then; `onProgress` gets the share that has gone. */
 export function sendScan(file: File, onProgress: (share: number) => void): Promise<SetupState> {
   return send("upload", file, onProgress);
 }

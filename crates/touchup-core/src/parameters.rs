@@ -656,7 +656,7 @@ macro_rules! parameters {
     };
 }
 
-/// Declares an enum whose variants have names: `ALL`, `name` and `Display`.
+/// Declares an enum whose variants have names: `ALL`, `name`, `of_name` and `Display`.
 #[macro_export]
 macro_rules! names {
     (
@@ -677,6 +677,11 @@ macro_rules! names {
                 match self {
                     $(Self::$One => $name,)*
                 }
+            }
+
+            /// The one of this name.
+            pub fn of_name(name: &str) -> Option<Self> {
+                Self::ALL.into_iter().find(|one| one.name() == name)
             }
         }
 

@@ -117,7 +117,7 @@ fn document(record: &InspectionRecord) -> String {
 
 /// What the characteristic is called in QIF.
 fn name_of(one: &CharacteristicRecord) -> &'static str {
-    match InspectedQuantity::of(&one.quantity) {
+    match InspectedQuantity::of_name(&one.quantity) {
         Some(InspectedQuantity::Diameter) | None => "Diameter",
         Some(InspectedQuantity::Width) => "Width",
         Some(InspectedQuantity::Length) => "Length",
@@ -146,7 +146,7 @@ fn aspect(one: &CharacteristicRecord, aspect: &str, id: usize, content: &str) ->
 }
 
 fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
-    let is_zone = InspectedQuantity::of(&one.quantity).is_some_and(InspectedQuantity::is_zone);
+    let is_zone = InspectedQuantity::of_name(&one.quantity).is_some_and(InspectedQuantity::is_zone);
     let (lower, upper) = (one.number("lower_limit"), one.number("upper_limit"));
     let content = if is_zone {
         let width = format!("<ToleranceValue>{}</ToleranceValue>", upper.unwrap_or(0.0));
@@ -173,7 +173,7 @@ fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
 
 fn nominal(one: &CharacteristicRecord, ids: &Ids) -> String {
     let mut content = format!("<CharacteristicDefinitionId>{}</CharacteristicDefinitionId>", ids.definition);
-    let quantity = InspectedQuantity::of(&one.quantity);
+    let quantity = InspectedQuantity::of_name(&one.quantity);
     if !quantity.is_some_and(InspectedQuantity::is_zone) {
         let _ = write!(content, "<TargetValue>{}</TargetValue>", one.number("nominal").unwrap_or(0.0));
     }

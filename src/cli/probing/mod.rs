@@ -191,7 +191,7 @@ pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError
         "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
     let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
-    let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
+    let kind = Kind::of_name(name);
     match metres(numbers).ok_or_else(wrong)?[..] {
         _ if kind.is_none() && name != "unknown" => Err(wrong()),
         [x, y, z] => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),

@@ -53,7 +53,7 @@ pub(super) fn probability(share: f64) -> String {
 
 /// What a quantity is called in words.
 pub(super) fn in_words(quantity: &str) -> String {
-    InspectedQuantity::of(quantity).map_or(quantity, |quantity| quantity.parts().0).replace('_', " ")
+    InspectedQuantity::of_name(quantity).map_or(quantity, |quantity| quantity.parts().0).replace('_', " ")
 }
 
 pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {

@@ -23,7 +23,7 @@ pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> String {
         (None, Some(upper)) => (upper - reach, upper),
         (None, None) => return String::new(),
     };
-    let low = if InspectedQuantity::of(&one.quantity).is_some_and(InspectedQuantity::is_zone) { 0.0 } else { low };
+    let low = if InspectedQuantity::of_name(&one.quantity).is_some_and(InspectedQuantity::is_zone) { 0.0 } else { low };
     let margin = (high - low) * 0.35;
     let [width, height] = SIZE;
     let x = |value: f64| ((value - low + margin) / (high - low + 2.0 * margin) * width).clamp(2.0, width - 2.0);

@@ -121,7 +121,7 @@ impl RefinementWorker {
     /// RViz's Publish Point.
     pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
         let parameters = self.setup.shared.parameters();
-        let kind = Kind::ALL.into_iter().find(|kind| kind.name() == parameters.string("flag_kind"));
+        let kind = Kind::of_name(parameters.string("flag_kind"));
         match self.point_in_object(clicked) {
             Ok(place) => {
                 self.ask_features(FeatureInput::Flag(Flag { id: 0, kind, place, radius: self.flag_radius() }, None));

@@ -12,6 +12,7 @@ mod convert;
 mod diagnostics;
 mod doubts;
 mod error;
+mod evaluating_variances;
 mod feature_messages;
 mod feature_worker;
 mod frame_resolver;
@@ -33,7 +34,6 @@ mod taking_out;
 mod tiles;
 mod tip;
 mod variances;
-mod vertex_variance;
 mod view;
 
 pub use arm::{ArmKind, ArmOfNode};

@@ -93,5 +93,5 @@ fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> 
 
 /// The unit of the files, of the parameter `mesh_unit`.
 pub fn mesh_unit(parameters: &Parameters) -> MeshUnit {
-    MeshUnit::ALL.into_iter().find(|unit| unit.name() == parameters.string("mesh_unit")).unwrap_or_default()
+    MeshUnit::of_name(parameters.string("mesh_unit")).unwrap_or_default()
 }

@@ -50,11 +50,6 @@ names! {
 }
 
 impl InspectedQuantity {
-    /// The one of a name.
-    pub fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|quantity| quantity.name() == name)
-    }
-
     /// Name and unit apart: `diameter`, `mm`.
     pub fn parts(self) -> (&'static str, &'static str) {
         self.name().rsplit_once('_').unwrap_or((self.name(), ""))
@@ -134,9 +129,9 @@ mod tests {
     fn every_name_ends_in_its_unit_and_is_read_again() {
         for quantity in InspectedQuantity::ALL {
             assert!(matches!(quantity.unit(), "mm" | "deg"), "{quantity}");
-            assert_eq!(InspectedQuantity::of(quantity.name()), Some(quantity));
+            assert_eq!(InspectedQuantity::of_name(quantity.name()), Some(quantity));
         }
-        assert_eq!(InspectedQuantity::of("diameter"), None);
+        assert_eq!(InspectedQuantity::of_name("diameter"), None);
     }
 
     #[test]

@@ -79,12 +79,12 @@ pub enum NominalTolerance {
 impl NominalRecord {
     /// The quantity, once it was checked.
     pub fn quantity(&self) -> Option<InspectedQuantity> {
-        InspectedQuantity::of(&self.quantity)
+        InspectedQuantity::of_name(&self.quantity)
     }
 
     /// The kind of the feature, once it was checked.
     pub fn kind(&self) -> Option<Kind> {
-        kind_of(&self.kind)
+        Kind::of_name(&self.kind)
     }
 
     /// Nominal value, mm or degrees; 0 of a zone.
@@ -130,7 +130,7 @@ impl NominalRecord {
             return Err("it has no name: give one in the column name".to_owned());
         }
         check_kind(name, kind)?;
-        let Some(quantity) = InspectedQuantity::of(quantity) else {
+        let Some(quantity) = InspectedQuantity::of_name(quantity) else {
             return Err(format!(
                 "{name}: there is no quantity {quantity:?}: take one of {}",
                 InspectedQuantity::ALL.map(InspectedQuantity::name).join(", ")
@@ -226,18 +226,14 @@ impl NominalRecord {
     }
 }
 
-fn kind_of(name: &str) -> Option<Kind> {
-    Kind::ALL.into_iter().find(|kind| kind.name() == name)
-}
-
 impl DatumRecord {
     /// The kind of the feature, once it was checked.
     pub fn kind(&self) -> Option<Kind> {
-        kind_of(&self.kind)
+        Kind::of_name(&self.kind)
     }
 }
 
 fn check_kind(name: &str, kind: &str) -> Result<(), String> {
     let kinds = || Kind::ALL.map(Kind::name).join(", ");
-    kind_of(kind).map(drop).ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
+    Kind::of_name(kind).map(drop).ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
 }

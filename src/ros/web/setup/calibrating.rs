@@ -136,7 +136,9 @@ impl NodeSetup {
     }
 }
 
-/// - `at_share`: is told now and then how much of the recording has been read.
+/// Makes a calibration.
+///
+/// - `at_share`: called now and then with the share of the recording that has been read.
 fn calibrated(
     inputs: &CalibrationInputs,
     topics: &Topics,
