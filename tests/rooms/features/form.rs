@@ -198,9 +198,10 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
     let count = ratios.0.len() as f64;
     let rms = (ratios.0.iter().map(|(_, ratio)| ratio * ratio).sum::<f64>() / count).sqrt();
     println!("rms of error over uncertainty: {rms:.2} of {count}; {turned_away} of {} times turned away", 2 * seeds);
-    assert!(2 * turned_away <= seeds, "in most the hand is let in: {turned_away} of {}", 2 * seeds);
     for (name, ratio) in &ratios.0 {
         assert!(ratio.abs() < 4.0, "{name} is off by {ratio} of its uncertainty");
     }
     assert!(rms < 1.5, "{rms}");
+    // last, so that the others are seen
+    assert_eq!(turned_away, 0, "times of {} that the hand did not come into the blind hole", 2 * seeds);
 }

@@ -136,7 +136,7 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
 /// Samples are taken, and what they say of the part cannot be.
 #[test]
 fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
-    let plate = Plate::touched(0.1);
+    let plate = Plate::touched(either(0.1, 0.2));
     let states_of = |sign: f64| {
         let mut bench = Bench::start(&plate);
         bench.play_as(&plate.messages, |message| {
@@ -156,7 +156,10 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
         states
     };
     let sound = states_of(1.0);
-    assert!(sound.len() > 5 && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR), "{sound:?}");
+    assert!(
+        sound.len() > either(5, 10) && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR),
+        "{sound:?}"
+    );
     let reversed = states_of(-1.0);
     let (level, said) = reversed.last().unwrap();
     let is_named = said.starts_with("doubts its input (wrench_sign)") && said.contains("reverse the wrench");
