@@ -6,8 +6,8 @@ use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
 
-/// Frames of messages that name none: those of the object and of the stylus.
-const UNNAMED: [&str; 2] = ["object", "stylus"];
+/// The frame of messages that name none; one for poses and wrenches, as those that name none are in the same axes.
+const UNNAMED: &str = "unnamed";
 
 /// What was written.
 #[derive(Debug, Default)]
@@ -51,12 +51,12 @@ pub fn copy_recording(
             }
         };
         let is_wrench = matches!(record, Record::Message(Message::Wrench(_)));
-        let (count, frame, unnamed) = match is_wrench {
-            true => (&mut copied.wrenches, reader.wrench_frame(), UNNAMED[1]),
-            false => (&mut copied.poses, reader.pose_frame(), UNNAMED[0]),
+        let (count, frame) = match is_wrench {
+            true => (&mut copied.wrenches, reader.wrench_frame()),
+            false => (&mut copied.poses, reader.pose_frame()),
         };
         *count += 1;
-        writer.write(record, frame.filter(|frame| !frame.is_empty()).unwrap_or(unnamed))?;
+        writer.write(record, frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED))?;
         at_each();
     }
     writer.finish()?;

@@ -17,6 +17,7 @@ mod decode;
 mod error;
 mod folder;
 mod framing;
+mod intake;
 mod layout;
 mod mcap;
 mod message_type;

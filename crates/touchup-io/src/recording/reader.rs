@@ -8,20 +8,19 @@ use std::path::{Path, PathBuf};
 
 use super::bag::BagReader;
 use super::bag_index;
-use super::cdr::unpack;
 use super::columns::WrenchAxes;
 use super::db3::{self, Db3Reader};
-use super::decode::{Decoded, decode};
+use super::decode::Decoded;
 use super::error::BadCount;
 use super::folder::files_of;
+use super::intake::{Intake, decode_raw};
 use super::mcap::{self, McapReader};
-use super::number_table::{NumberTable, TableRow, is_table};
+use super::number_table::{NumberTable, is_table};
 use super::topics::check_topics;
-use super::transforms::{TransformChain, TransformTree};
-use super::wire::Wire;
+use super::transforms::TransformTree;
 use super::{
-    BadMessage, FilePlace, RawMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource, TopicInfo,
-    TopicKind, TransformFrames, ZSTD_MAGIC,
+    BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource, TopicInfo, TopicKind,
+    TransformFrames, ZSTD_MAGIC,
 };
 use touchup_core::numeric::counted;
 use touchup_core::stylus::Message;
@@ -107,11 +106,7 @@ impl RecordingReader {
         let table = NumberTable::open(path, &layout.columns)?;
         let [object, stylus] = TABLE_FRAMES;
         let wrench_frame = if table.wrench_axes() == WrenchAxes::Pose { object } else { stylus };
-        let intake = Intake {
-            pose_frame: Some(object.to_owned()),
-            wrench_frame: Some(wrench_frame.to_owned()),
-            ..Intake::default()
-        };
+        let intake = Intake::in_frames(object, wrench_frame);
         Ok(Self {
             layout: layout.clone(),
             path: path.to_owned(),
@@ -269,99 +264,6 @@ impl Iterator for RecordingReader {
 }
 
 impl FusedIterator for RecordingReader {}
-
-/// Decodes messages, and counts frames and unusable messages.
-#[derive(Default)]
-struct Intake {
-    pose_frame: Option<String>,
-    wrench_frame: Option<String>,
-    /// of a message that holds both, what comes behind the first
-    second: Option<Record>,
-    /// where the pose comes from transforms
-    chain: Option<TransformChain>,
-    bad: BTreeMap<BadMessage, BadCount>,
-}
-
-impl Intake {
-    fn take_chain(&mut self, chain: TransformChain) {
-        self.pose_frame = Some(chain.base.clone());
-        self.chain = Some(chain);
-    }
-
-    fn accept(&mut self, raw: &RawMessage, path: &Path, stamps: StampSource) -> Option<Record> {
-        let decoded = self.decode(raw, stamps);
-        if let Err(reason) = decoded {
-            let holds = [raw.kind != TopicKind::Wrench, matches!(raw.kind, TopicKind::Wrench | TopicKind::State)];
-            self.leave_out(reason, holds, path, raw.place);
-        }
-        decoded.ok().flatten()
-    }
-
-    /// Pose and wrench of a row of a table.
-    fn accept_row(&mut self, row: Result<TableRow, BadMessage>, place: FilePlace, path: &Path) -> Option<Record> {
-        match row {
-            Ok(TableRow { pose, wrench }) => {
-                let wrench = wrench.map(|wrench| Record::from(Message::Wrench(wrench)));
-                let Some(pose) = pose else { return wrench };
-                self.second = wrench;
-                Some(Message::Pose(pose).into())
-            }
-            Err(reason) => {
-                self.leave_out(reason, [true; 2], path, place);
-                None
-            }
-        }
-    }
-
-    /// - `holds`: whether it holds a pose, and a wrench.
-    fn leave_out(&mut self, reason: BadMessage, holds: [bool; 2], path: &Path, place: FilePlace) {
-        let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place };
-        let bad = self.bad.entry(reason).or_insert(first);
-        bad.poses += u64::from(holds[0]);
-        bad.wrenches += u64::from(holds[1]);
-    }
-
-    fn decode(&mut self, raw: &RawMessage, stamps: StampSource) -> Result<Option<Record>, BadMessage> {
-        let stamped = |mut record: Record| {
-            if stamps == StampSource::Log {
-                record.set_stamp(raw.logged_ns);
-            }
-            record
-        };
-        match decode_raw(raw)? {
-            Decoded::Record(frame, record) => {
-                let is_wrench = raw.kind == TopicKind::Wrench;
-                let first = if is_wrench { &mut self.wrench_frame } else { &mut self.pose_frame };
-                in_one_frame(first, &frame)?;
-                Ok(Some(stamped(record)))
-            }
-            Decoded::State(frame, pose, wrench) => {
-                in_one_frame(&mut self.pose_frame, &frame)?;
-                self.wrench_frame = Some(frame);
-                self.second = Some(stamped(Message::Wrench(wrench).into()));
-                Ok(Some(stamped(Message::Pose(pose).into())))
-            }
-            Decoded::Transforms(links) => {
-                let Some(chain) = &mut self.chain else { return Ok(None) };
-                let pose = chain.push(links, raw.kind == TopicKind::StaticTransforms)?;
-                Ok(pose.map(|pose| stamped(Message::Pose(pose).into())))
-            }
-        }
-    }
-}
-
-/// All messages of a topic name the frame that the first one named.
-fn in_one_frame(first: &mut Option<String>, frame: &str) -> Result<(), BadMessage> {
-    let is_first = first.get_or_insert_with(|| frame.to_owned()) == frame;
-    if is_first { Ok(()) } else { Err(BadMessage::FrameChanged) }
-}
-
-fn decode_raw(raw: &RawMessage) -> Result<Decoded, BadMessage> {
-    match raw.format.wire {
-        Wire::Cdr => decode(raw.format, &unpack(&raw.payload)?, raw.logged_ns),
-        Wire::Ros1 => decode(raw.format, &raw.payload, raw.logged_ns),
-    }
-}
 
 /// Opens one file of a recording; with the damage that was met on the search for its topics.
 fn open_file(
