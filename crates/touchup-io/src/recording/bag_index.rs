@@ -1,6 +1,7 @@
 //! The headers of the records of a ROS 1 bag, its connections and its index.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -63,8 +64,11 @@ impl<'a> Head<'a> {
     }
 }
 
+/// Name and value.
+type NamedField<'a> = (&'a [u8], &'a [u8]);
+
 /// `name=value`, each with its length in front.
-fn named_fields(bytes: &[u8]) -> Result<Vec<(&[u8], &[u8])>, Damage> {
+fn named_fields(bytes: &[u8]) -> Result<Vec<NamedField<'_>>, Damage> {
     let (mut rest, mut fields) = (Fields(bytes), Vec::new());
     while !rest.0.is_empty() {
         let field = rest.sized("field of a header")?;
@@ -93,7 +97,13 @@ impl Connections {
         let info = TopicInfo { name: text(head.topic), type_name, encoding: "ros1".to_owned() };
         let bytes = |info: &TopicInfo| info.name_bytes() + CONNECTION_BYTES;
         self.name_bytes.take(bytes(&info), self.topics.get(&head.connection).map_or(0, bytes))?;
-        Ok(self.topics.entry(head.connection).insert_entry(info).into_mut())
+        Ok(match self.topics.entry(head.connection) {
+            Entry::Vacant(place) => place.insert(info),
+            Entry::Occupied(mut known) => {
+                known.insert(info);
+                known.into_mut()
+            }
+        })
     }
 
     pub fn has(&self, layout: &RecordingLayout) -> bool {

@@ -70,7 +70,8 @@ pub(super) fn decode(format: MessageFormat, payload: &[u8], logged_ns: i64) -> R
             let pose = pose_in(reader.header()?, &mut reader)?;
             // redundancy: a number, status and turn
             reader.skip_f64s(1)?;
-            (reader.u32()?, reader.u32()?);
+            reader.u32()?;
+            reader.u32()?;
             pose
         }
         MessageType::PoseStamped | MessageType::PointCloud => pose_in(reader.header()?, &mut reader)?,
