@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{TriMesh, is_place, repair};
 use touchup_core::stylus::{Message, Sample, Wrench};
-use touchup_io::recording::{Record, RecordingReader, Topics};
+use touchup_io::recording::{Record, RecordingLayout, RecordingReader};
 
 /// The ball of the targets: radius in m, stiffness in N/m.
 pub const BALL: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
@@ -150,8 +150,8 @@ pub fn assert_is_somewhere(mesh: &TriMesh) {
 }
 
 /// Reads a recording to its end: what it says of itself and each message.
-pub fn read_all(path: &Path, topics: &Topics) {
-    let Ok(mut reader) = RecordingReader::open(path, topics) else { return };
+pub fn read_all(path: &Path, layout: impl Into<RecordingLayout>) {
+    let Ok(mut reader) = RecordingReader::open(path, layout) else { return };
     while let Some(record) = reader.next_record() {
         if let Ok(Record::Message(Message::Pose(pose))) = record {
             assert!((pose.pose_ot.rotation.norm() - 1.0).abs() < 1e-6, "{pose:?}");

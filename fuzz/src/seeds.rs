@@ -13,10 +13,20 @@ use touchup_session::scene::Scene;
 /// Topic of the markers.
 pub const MARKERS: &str = "/markers";
 
-const TOPICS: [(&str, &str); 3] = [
+/// Topics and types of [`mcap_of`], by their number.
+pub const TOPICS: [(&str, &str); 12] = [
     ("/stylus/pose", "geometry_msgs/msg/PoseStamped"),
     ("/stylus/wrench", "geometry_msgs/msg/WrenchStamped"),
     (MARKERS, "sensor_msgs/msg/PointCloud2"),
+    ("/tf", "tf2_msgs/msg/TFMessage"),
+    ("/tf_static", "tf2_msgs/msg/TFMessage"),
+    ("/odometry", "nav_msgs/msg/Odometry"),
+    ("/covariance", "geometry_msgs/msg/PoseWithCovarianceStamped"),
+    ("/transform", "geometry_msgs/msg/TransformStamped"),
+    ("/state", "franka_msgs/msg/FrankaState"),
+    ("/bare_pose", "geometry_msgs/msg/Pose"),
+    ("/bare_wrench", "geometry_msgs/msg/Wrench"),
+    ("/iiwa_pose", "iiwa_msgs/msg/CartesianPose"),
 ];
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -124,6 +134,36 @@ pub fn mcap_bytes() -> Vec<u8> {
     writer.finish().expect("memory takes bytes").into_inner()
 }
 
+/// A ROS 1 bag without index: a connection for the pose and one for the wrench, and a message of each.
+fn bag_bytes() -> Vec<u8> {
+    let fields = |fields: &[(&str, &[u8])]| {
+        let field = |(name, value): &(&str, &[u8])| {
+            let body = [name.as_bytes(), b"=", value].concat();
+            [&(body.len() as u32).to_le_bytes()[..], &body].concat()
+        };
+        fields.iter().flat_map(field).collect::<Vec<_>>()
+    };
+    let sized = |bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes()[..], bytes].concat();
+    let record = |head: &[(&str, &[u8])], data: &[u8]| [sized(&fields(head)), sized(data)].concat();
+    let mut bag = b"#ROSBAG V2.0\n".to_vec();
+    bag.extend(record(
+        &[("op", &[3]), ("index_pos", &[0; 8]), ("conn_count", &[0; 4]), ("chunk_count", &[0; 4])],
+        b" ",
+    ));
+    let mut records = Vec::new();
+    for (number, (topic, kind), numbers) in [(0u32, TOPICS[0], 7), (1, TOPICS[1], 6)] {
+        let (kind, id) = (kind.replace("/msg/", "/"), number.to_le_bytes());
+        let about = fields(&[("topic", topic.as_bytes()), ("type", kind.as_bytes())]);
+        records.extend(record(&[("op", &[7]), ("conn", &id), ("topic", topic.as_bytes())], &about));
+        let numbers: Vec<u8> = (1..=numbers).flat_map(|at| f64::from(u8::from(at == numbers)).to_le_bytes()).collect();
+        let message = [&[0; 12][..], &sized(b"part"), &numbers].concat();
+        records.extend(record(&[("op", &[2]), ("conn", &id), ("time", &[1, 0, 0, 0, 2, 0, 0, 0])], &message));
+    }
+    let size = (records.len() as u32).to_le_bytes();
+    bag.extend(record(&[("op", &[5]), ("compression", b"none"), ("size", &size)], &records));
+    bag
+}
+
 /// Pose, wrench and cloud in CDR.
 fn payloads() -> [Vec<u8>; 3] {
     let head = [&[0u8, 1, 0, 0][..], &1i32.to_le_bytes(), &2u32.to_le_bytes(), &text("part\0"), &[0; 3]].concat();
@@ -182,7 +222,7 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
     let mut scenes: Vec<_> = template.split("\n\n").map(|section| without_comments(section).into_bytes()).collect();
     scenes.push(b"contact: {}\ntip: {radius_mm: 1.5}\nrefine: {mode: paper}\npatch: {tolerance_mm: 0.04}\nmarkers: {positions_mm: [[0, 0, 0]]}".into());
     let touches = [touchup_io::touches_file::HEADER, "\n", TOUCHES].concat();
-    let all: [(&str, Vec<Vec<u8>>); 15] = [
+    let all: [(&str, Vec<Vec<u8>>); 16] = [
         (
             "mesh",
             vec![
@@ -206,6 +246,17 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
         ("scene", scenes),
         ("recording", vec![mcap_bytes(), mcap_of(&[(0, &payloads()[0]), (1, &payloads()[1]), (2, &payloads()[2])])]),
         ("rosbag2", vec![METADATA.into()]),
+        (
+            "own_data",
+            vec![
+                kind(
+                    0,
+                    b"t_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,fx_n,fy_n,fz_n\n1.5,1,2,3,0,0,0,1,1,2,3\n2,,,,0,0,0,1,1,2,3\n",
+                ),
+                kind(1, b"t;x;y;z;a;b;c;u;v;w\n1;1;2;3;0;0;90;1;2;3\n"),
+                kind(2, &bag_bytes()),
+            ],
+        ),
         ("messages", vec![messages[0].clone(), messages[1].clone(), messages[2].clone(), messages.concat()]),
         ("table", vec![PAIRS.into(), POSES.into(), touches.into(), TOUCH_LINE.replace('\n', "").into()]),
         ("features", vec![FEATURES.into()]),

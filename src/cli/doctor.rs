@@ -8,12 +8,13 @@ use serde::Serialize;
 
 use super::offsets::WrenchOffset;
 use super::progress::WorkProgress;
+use super::recorded::RecordedFlags;
 use super::told::{ToldFlags, ToldNumbers};
 use super::{CliError, Losses, print_report};
 use crate::diagnose::InputFinding;
 use crate::input_check::{InputCheck, check_input};
 use crate::io::mesh_file::MeshUnit;
-use crate::io::recording::{StampSource, Topics};
+use crate::io::recording::StampSource;
 use crate::replay::{Recording, marker_filter};
 use crate::scan::read_scan;
 
@@ -22,7 +23,7 @@ pub(super) struct DoctorArguments {
     /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
+    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Unit of the coordinates in the scan's file
@@ -31,15 +32,8 @@ pub(super) struct DoctorArguments {
     /// Names tip, frames, thresholds and pairing; the flags below override it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// geometry_msgs/WrenchStamped: the wrench of the part on the stylus
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
-    wrench_topic: String,
-    /// geometry_msgs/PoseStamped: the centre of the ball
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
-    pose_topic: String,
-    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose
-    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
-    markers_topic: Option<String>,
+    #[command(flatten)]
+    recorded: RecordedFlags,
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
@@ -81,10 +75,8 @@ pub(super) const UNSOUND: (&str, u8) = ("input", 3);
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
     let scan = read_scan(&arguments.scan, arguments.mesh_unit)?.mesh;
-    let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
-    let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
-    let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
-    let recording = Recording::open(&arguments.recording, &topics, arguments.stamp)?;
+    let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
+    let recording = Recording::open(&arguments.recording, arguments.recorded.layout(&scene), arguments.stamp)?;
     let mut progress = WorkProgress::new("replay", recording.message_count());
     let found = check_input(recording, &scan, &scene, markers, &mut || progress.step())?;
     let InputCheck { findings, clock_offset, losses } = found;

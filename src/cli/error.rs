@@ -15,6 +15,7 @@ use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::nominal_file::NominalFileError;
+use crate::io::result_table::ResultTableError;
 use crate::io::touches_file::TouchesFileError;
 use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
 use crate::probing::plan::ExploreError;
@@ -192,6 +193,10 @@ errors_of_rooms! {
     crate::session::SessionError => |_| ("session", 3), "";
     TouchesFileError => of_touches, "";
     FeaturesFileError => of_features, "";
+    ResultTableError => |error| match error {
+        ResultTableError::Touches(error) => of_touches(error),
+        ResultTableError::File(_) | ResultTableError::Parquet(_) => NOT_WRITTEN,
+    }, "";
     NominalFileError => |error| match error {
         NominalFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
         _ => ("nominal", 3),

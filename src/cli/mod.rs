@@ -11,6 +11,7 @@ mod begin;
 mod calibrate;
 mod check;
 mod compare;
+mod convert;
 mod demo;
 mod demo_robot;
 mod disagree;
@@ -33,6 +34,7 @@ mod probe;
 mod probing;
 mod progress;
 mod rates;
+mod recorded;
 mod recover;
 mod refine;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -104,6 +106,8 @@ enum Verb {
     Demo(demo::DemoArguments),
     /// Measures how far a mesh is from the true part, in numbers and as a picture
     Compare(compare::CompareArguments),
+    /// Makes an MCAP recording with poses and wrenches of any recording that can be read
+    Convert(convert::ConvertArguments),
     /// Finds where touch and scan disagree, and whether scanner, part or touch is to blame
     Disagree(disagree::DisagreeArguments),
     /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that it touched
@@ -177,6 +181,7 @@ impl Verb {
         match self {
             Self::Calibrate(arguments) => calibrate::calibrate(arguments),
             Self::Compare(arguments) => compare::compare(arguments),
+            Self::Convert(arguments) => convert::convert(arguments),
             Self::Demo(arguments) => demo::demo(arguments),
             Self::Disagree(arguments) => disagree::disagree(arguments),
             Self::Doctor(arguments) => doctor::doctor(arguments),

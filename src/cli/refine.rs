@@ -19,6 +19,7 @@ use super::page::{on_page, parameters_of};
 use super::path_parameter::path;
 use super::progress::WorkProgress;
 use super::rates::{LiveSummary, Rates};
+use super::recorded::RecordedFlags;
 use super::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
@@ -45,7 +46,7 @@ pub(super) struct RefineArguments {
     /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
     #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = path_or_none())]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder
+    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
     #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = path_or_none())]
     bag: PathBuf,
     /// Output: the refined mesh as PLY, STL or OBJ, in the unit of the scan
@@ -57,16 +58,8 @@ pub(super) struct RefineArguments {
     /// Names the parts and their parameters; the flags below override it
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
-    /// geometry_msgs/WrenchStamped: the wrench of the part on the stylus
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
-    wrench_topic: String,
-    /// geometry_msgs/PoseStamped: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space in the
-    /// scene say
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
-    pose_topic: String,
-    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
-    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic")]
-    markers_topic: Option<String>,
+    #[command(flatten)]
+    recorded: RecordedFlags,
     /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
@@ -94,7 +87,7 @@ pub(super) struct RefineArguments {
     touches_out: Option<PathBuf>,
     /// Folder of a session of the node: takes scan, scene and touches from there, also after a crash, and writes refined.ply,
     /// features.json and touches.csv there unless they have places of their own
-    #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "markers_topic"])]
+    #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
     resume: Option<PathBuf>,
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
@@ -247,9 +240,8 @@ impl RefineArguments {
     ) -> Self {
         let out = folder.join("refined.ply");
         let [features_out, touches_out] = ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
-        let Topics { pose: pose_topic, wrench: wrench_topic, markers: markers_topic } = topics;
         let files = Self { scan, bag, out, mesh_unit, scene, features_out, touches_out, ..Self::default() };
-        Self { wrench_topic, pose_topic, markers_topic, ..files }
+        Self { recorded: topics.into(), ..files }
     }
 
     /// With what the session to be resumed, or the scene, names in place of flags.
@@ -257,7 +249,7 @@ impl RefineArguments {
         if let Some(session) = self.resume.take() {
             let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
-            (self.bag, self.wrench_topic, self.pose_topic) = (recording, topics.wrench, topics.pose);
+            (self.bag, self.recorded) = (recording, topics.into());
             self.strokes = strokes;
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
@@ -282,10 +274,8 @@ impl RefineArguments {
         require(self.strokes.is_empty(), "--web begins a session: resume the other one without it")?;
         let (scene, _) = self.scene()?;
         self.check_out()?;
-        let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
-        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
-        let recording =
-            Recording::open(&self.bag, &Topics { pose, wrench, markers: self.markers_topic.clone() }, self.stamp)?;
+        let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
+        let recording = Recording::open(&self.bag, self.recorded.layout(&scene), self.stamp)?;
         let folder = self.out.parent().unwrap_or(Path::new("")).join("sessions");
         let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
         // files that the scene names are relative to its folder
@@ -309,10 +299,8 @@ impl RefineArguments {
         let Scan { mesh, repair, cloud } = read_scan(&self.scan, self.mesh_unit)?;
         let CutScan { mesh, cut } = scene.cut(mesh)?;
         let as_scanned = mesh.clone();
-        let markers = marker_filter(&scene, self.markers_topic.as_deref())?;
-        let (pose, wrench) = (self.pose_topic.clone(), self.wrench_topic.clone());
-        let topics = Topics { pose, wrench, markers: self.markers_topic.clone() };
-        let recording = Recording::open(&self.bag, &topics, self.stamp)?;
+        let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
+        let recording = Recording::open(&self.bag, self.recorded.layout(&scene), self.stamp)?;
         let recording_frame = recording.wrench_frame;
         let params = scene.refine_params(recording_frame).ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
         let params = cut.refine_params(params);
@@ -439,7 +427,7 @@ impl RefineArguments {
             LeftOut { part: "robot", reason: "a replay moves no arm" },
             LeftOut { part: "markers", reason: "the recording is read for poses" },
         ];
-        let unused = if self.markers_topic.is_some() { &unused[..1] } else { &unused };
+        let unused = if self.recorded.markers_topic.is_some() { &unused[..1] } else { &unused };
         let memory = Memory::of(rates.engine.footprint(), scan_bytes + rates.scan_bytes());
         SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
     }

@@ -9,8 +9,9 @@ use clap::Args;
 use serde::Serialize;
 
 use super::progress::WorkProgress;
+use super::recorded::RecordedFlags;
 use super::{CliError, Losses, counted, notify, print_report};
-use crate::io::recording::{StampSource, Topics};
+use crate::io::recording::StampSource;
 use crate::replay::{Recording, Replayed, each_message, marker_filter};
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
@@ -33,7 +34,7 @@ const LINGER: Duration = Duration::from_millis(300);
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArguments {
-    /// A ROS 2 recording, MCAP or SQLite, a file or a folder
+    /// A ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Speed, in multiples of the recorded one
@@ -42,15 +43,8 @@ pub(super) struct ReplayArguments {
     /// What touched: selects the topics to play on
     #[arg(long, value_name = "WHO", default_value = "stylus", value_parser = ["stylus", "probe"])]
     source: String,
-    /// geometry_msgs/WrenchStamped in the recording
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/wrench")]
-    wrench_topic: String,
-    /// geometry_msgs/PoseStamped in the recording
-    #[arg(long, value_name = "TOPIC", default_value = "/stylus/pose")]
-    pose_topic: String,
-    /// sensor_msgs/PointCloud2: the markers on the stylus, from which the pose is made; needs a scene that says where they sit
-    #[arg(long, value_name = "TOPIC", conflicts_with = "pose_topic", requires = "scene")]
-    markers_topic: Option<String>,
+    #[command(flatten)]
+    recorded: RecordedFlags,
     /// The scene that says where the markers sit
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
@@ -80,10 +74,8 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     let source = ParameterValue::String(arguments.source.clone());
     config.parameters.set("source", &source).map_err(CliError::usage)?;
     let scene = arguments.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-    let markers = marker_filter(&scene, arguments.markers_topic.as_deref())?;
-    let (pose, wrench) = (arguments.pose_topic.clone(), arguments.wrench_topic.clone());
-    let topics = Topics { pose, wrench, markers: arguments.markers_topic.clone() };
-    let recording = Recording::open(&arguments.recording, &topics, StampSource::Header)?;
+    let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
+    let recording = Recording::open(&arguments.recording, arguments.recorded.layout(&scene), StampSource::Header)?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 

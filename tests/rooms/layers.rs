@@ -30,7 +30,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("compare", "numeric stylus mesh align features"),
     ("calibrate", "numeric stylus mesh align"),
     ("diagnose", "numeric stylus mesh"),
-    ("io", "parameters stylus mesh form features conformity align arm execute"),
+    ("io", "numeric parameters stylus mesh form features conformity align arm execute"),
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),

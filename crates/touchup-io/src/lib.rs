@@ -52,6 +52,7 @@ pub mod png;
 pub mod probed_touches_file;
 pub mod qif_file;
 pub mod recording;
+pub mod result_table;
 mod scalar;
 pub mod scan_folder;
 pub mod session_folder;

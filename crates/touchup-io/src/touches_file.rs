@@ -60,7 +60,7 @@ pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
     touches.iter().enumerate().map(rounded).collect()
 }
 
-fn line_of(touch: &ProbedPoint, number: usize) -> String {
+pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
     let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, place, weight, .. } = touch;
     let triple = |v: Vector3<f64>| format!("{:.6},{:.6},{:.6}", v.x, v.y, v.z);
     let [centre, point, normal] = [centre.coords * 1e3, point.coords * 1e3, *normal].map(triple);

@@ -7,7 +7,7 @@ use touchup_core::numeric::counted;
 use touchup_core::stylus::{
     MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
 };
-use touchup_io::recording::{Record, RecordingError, RecordingReader, StampSource, Topics};
+use touchup_io::recording::{Record, RecordingError, RecordingLayout, RecordingReader, StampSource};
 
 use crate::scene::Scene;
 
@@ -58,15 +58,16 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError`] of opening it.
-    pub fn open(path: &Path, topics: &Topics, stamps: StampSource) -> Result<Self, RecordingError> {
-        let mut reader = RecordingReader::open(path, topics)?.stamped_by(stamps);
+    pub fn open(path: &Path, layout: impl Into<RecordingLayout>, stamps: StampSource) -> Result<Self, RecordingError> {
+        let layout = layout.into();
+        let mut reader = RecordingReader::open(path, &layout)?.stamped_by(stamps);
         let mut ahead = VecDeque::new();
         while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
             let Some(record) = reader.next_record() else { break };
             ahead.push_back(record);
         }
         let wrench_frame =
-            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, topics)? };
+            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, &layout)? };
         Ok(Self { reader, ahead, wrench_frame })
     }
 
@@ -100,8 +101,8 @@ fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
 }
 
 /// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
-fn find_wrench_frame(path: &Path, topics: &Topics) -> Result<WrenchFrame, RecordingError> {
-    let mut reader = RecordingReader::open(path, topics)?;
+fn find_wrench_frame(path: &Path, layout: &RecordingLayout) -> Result<WrenchFrame, RecordingError> {
+    let mut reader = RecordingReader::open(path, layout)?;
     while !knows_frames(&reader) && reader.next_record().is_some() {}
     Ok(wrench_frame(&reader))
 }
@@ -217,19 +218,14 @@ impl Replayed {
 
     /// Adds the counts of the reader.
     fn account_reader(&mut self, recording: &RecordingReader) {
+        self.losses.extend(recording.losses());
         for (reason, bad) in recording.bad_messages() {
-            let (path, place) = (bad.path.display(), &bad.place);
-            let messages = counted(bad.poses + bad.wrenches, "message", "messages");
-            self.losses.push(format!("{messages} {reason}, the first in {path} at {place}"));
             self.wrenches += bad.wrenches;
             for (name, count) in [(reason.to_string(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
                 if count > 0 {
                     *self.refused.entry(name).or_default() += count;
                 }
             }
-        }
-        if recording.truncated() {
-            self.losses.push("the recording has lost its end; what is there was read".to_owned());
         }
     }
 }

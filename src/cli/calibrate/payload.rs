@@ -63,8 +63,9 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
         (Some(robot), ..) => payload_of_arm(arguments, robot, params.gravity),
         (_, Some(bag), _) => {
             let draft = target.open("--bag", bag)?;
-            let calibration = source
-                .calibrate(bag, |recording, at_each| calibrate_payload(recording, &draft.scene, params, at_each))?;
+            let calibration = source.calibrate(bag, &draft.scene, |recording, at_each| {
+                calibrate_payload(recording, &draft.scene, params, at_each)
+            })?;
             target.write(&draft, calibration)
         }
         (_, _, table) => {

@@ -39,7 +39,7 @@ pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
         Some(bag) => {
             check_kept("--bag", bag, &target.out)?;
             draft.require_radius()?;
-            source.calibrate(bag, |recording, at_each| {
+            source.calibrate(bag, &draft.scene, |recording, at_each| {
                 calibrate_scan(pairs, Some(recording), &draft.scene, sigma, at_each)
             })?
         }

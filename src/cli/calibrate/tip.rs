@@ -47,7 +47,8 @@ pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
     }
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
-    let calibration = source.calibrate(bag, |recording, at_each| calibrate_tip(recording, &draft.scene, at_each))?;
+    let calibration =
+        source.calibrate(bag, &draft.scene, |recording, at_each| calibrate_tip(recording, &draft.scene, at_each))?;
     target.write(&draft, calibration)
 }
 

@@ -13,9 +13,12 @@ use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, params};
 use tempfile::NamedTempFile;
 
-use super::cdr::MAX_MESSAGE_BYTES;
 use super::framing::NameBytes;
-use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
+use super::topics::check_topic;
+use super::wire::MAX_MESSAGE_BYTES;
+use super::{
+    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout, TopicInfo, TopicKind,
+};
 
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
 /// Rows fetched at a time.
@@ -31,19 +34,17 @@ const MAX_TOPICS: usize = 65_536;
 
 /// Longer payloads are not loaded; they come as NULL and count as malformed.
 const FETCH: &str = "SELECT id, timestamp, topic_id, CASE WHEN length(data) <= ?1 THEN data END FROM messages \
-                     WHERE topic_id IN (?2, ?3) AND (timestamp, id) > (?4, ?5) ORDER BY timestamp, id LIMIT ?6";
+                     WHERE topic_id IN (?2, ?3, ?4) AND (timestamp, id) > (?5, ?6) ORDER BY timestamp, id LIMIT ?7";
 
-/// Messages of the two topics of one SQLite file, by time of reception, then by row.
+/// Messages of the topics of a touch of one SQLite file, by time of reception, then by row.
 pub(super) struct Db3Reader {
     path: PathBuf,
     db: Connection,
     /// Holds the unpacked file while it is read.
     _unpacked: Option<NamedTempFile>,
     topics: Vec<TopicInfo>,
-    /// What is read.
-    kinds: [TopicKind; 2],
-    /// Row of each of them in the table `topics`.
-    ids: [Option<i64>; 2],
+    /// What is read: its row in the table `topics`, what it gives and how.
+    read: Vec<(i64, TopicKind, MessageFormat)>,
     rows: VecDeque<RawMessage<'static>>,
     /// Time and row of the last message fetched.
     last: (i64, i64),
@@ -55,7 +56,7 @@ pub(super) struct Db3Reader {
 
 impl Db3Reader {
     /// Opens a file (`packed`: compressed as a whole by zstd) and reads its table of topics.
-    pub fn open(path: &Path, topics: &Topics, packed: bool) -> Result<Self, RecordingError> {
+    pub fn open(path: &Path, layout: &RecordingLayout, packed: bool) -> Result<Self, RecordingError> {
         let unpacked = if packed { Some(unpack(path)?) } else { None };
         let db_path = unpacked.as_ref().map_or(path, |file| file.path());
         let damaged = |damage| RecordingError::Damaged { path: path.to_owned(), place: FilePlace::Row(0), damage };
@@ -66,12 +67,18 @@ impl Db3Reader {
         }
         let rows = read_topics(&db).map_err(damaged)?;
         let failed = find_cut(&db, db_path).err();
-        let id_of = |kind| rows.iter().find(|(_, info)| info.name == topics.name(kind)).map(|(id, _)| *id);
+        // a topic of a wrong type is an error of those who ask for the topics
+        let reads = |(id, info): &(i64, TopicInfo)| {
+            check_topic(path, layout, info).ok().flatten().map(|(kind, format)| (*id, kind, format))
+        };
+        let mut read: Vec<_> = rows.iter().filter_map(reads).collect();
+        // the first row of each, as many as the layout names
+        read.sort_by_key(|(id, kind, _)| (*kind, *id));
+        read.dedup_by_key(|(_, kind, _)| *kind);
         Ok(Self {
             path: path.to_owned(),
             truncated: failed.is_some() || has_unmerged_part(path),
-            kinds: topics.kinds(),
-            ids: topics.kinds().map(id_of),
+            read,
             db,
             _unpacked: unpacked,
             topics: rows.into_iter().map(|(_, info)| info).collect(),
@@ -90,11 +97,12 @@ impl Db3Reader {
     /// Fetches the next rows; those before an error stay.
     fn fetch(&mut self) -> Result<(), Damage> {
         let mut statement = self.db.prepare_cached(FETCH)?;
-        let ([first, second], (time, id)) = (self.ids, self.last);
-        let mut rows =
-            statement.query(params![MAX_MESSAGE_BYTES as i64, first, second, time, id, BATCH_ROWS as i64])?;
+        let ([first, second, third], (time, id)) = (ids(&self.read), self.last);
+        let longest = MAX_MESSAGE_BYTES as i64;
+        let mut rows = statement.query(params![longest, first, second, third, time, id, BATCH_ROWS as i64])?;
         while let Some(row) = rows.next()? {
-            let kind = if Some(row.get(2)?) == first { self.kinds[0] } else { self.kinds[1] };
+            let topic: i64 = row.get(2)?;
+            let Some(&(_, kind, format)) = self.read.iter().find(|(id, ..)| *id == topic) else { continue };
             // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
             let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
             let (id, time) = (row.get(0)?, row.get(1)?);
@@ -104,6 +112,7 @@ impl Db3Reader {
             self.last = (time, id);
             self.rows.push_back(RawMessage {
                 kind,
+                format,
                 payload: payload.into(),
                 logged_ns: time,
                 place: FilePlace::Row(id),
@@ -121,8 +130,8 @@ impl RecordingFile for Db3Reader {
 
     /// Reads through the table once.
     fn promised(&self) -> Option<u64> {
-        let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2)";
-        let found = self.db.query_row(count, self.ids, |row| row.get::<_, i64>(0));
+        let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2, ?3)";
+        let found = self.db.query_row(count, ids(&self.read), |row| row.get::<_, i64>(0));
         found.ok().and_then(|n| u64::try_from(n).ok())
     }
 
@@ -144,6 +153,11 @@ impl RecordingFile for Db3Reader {
             message => Ok(message),
         }
     }
+}
+
+/// Rows of the topics that are read: at most three.
+fn ids(read: &[(i64, TopicKind, MessageFormat)]) -> [Option<i64>; 3] {
+    [0, 1, 2].map(|at| read.get(at).map(|(id, ..)| *id))
 }
 
 fn connect(path: &Path) -> rusqlite::Result<Connection> {

@@ -1,9 +1,8 @@
 //! What can be wrong with a recording, and where.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::{TopicInfo, TopicKind, Topics};
 use crate::file_error::FilePlace;
 
 /// Why a recording cannot be opened, read to its end, or written.
@@ -18,8 +17,8 @@ pub enum RecordingError {
         /// its reason
         source: io::Error,
     },
-    /// Neither MCAP nor SQLite, plain or zstd-compressed.
-    #[error("{}: not a ROS 2 recording: {reason}", path.display())]
+    /// Neither MCAP nor SQLite, plain or zstd-compressed, nor a ROS 1 bag or a table.
+    #[error("{}: not a recording: {reason}", path.display())]
     NotARecording {
         /// file or folder
         path: PathBuf,
@@ -55,6 +54,24 @@ pub enum RecordingError {
         topic: String,
         /// what it is instead, and what to do
         why: String,
+    },
+    /// The transforms do not have the frame of the stylus, or not in the other one.
+    #[error("{}: {what}. It has: {found}", path.display())]
+    Frames {
+        /// the recording
+        path: PathBuf,
+        /// what is wrong, and the flag that mends it
+        what: String,
+        /// frames of the tree, as `child (in parent)`
+        found: String,
+    },
+    /// The columns of a table do not say which is what, or in what unit.
+    #[error("{}: {what}", path.display())]
+    Columns {
+        /// the table
+        path: PathBuf,
+        /// what is wrong, with the columns that are there, and what to do
+        what: String,
     },
     /// The file is damaged; everything before that place has been handed out.
     #[error("{}: damaged at {place}: {damage}", path.display())]
@@ -137,8 +154,8 @@ pub enum Damage {
         /// its number
         id: u16,
     },
-    /// The index at the end of the file promises another number of messages on the two topics.
-    #[error("the file's index promises {promised} messages on the two topics, {found} were found")]
+    /// The index at the end of the file promises another number of messages on the topics that are read.
+    #[error("the file's index promises {promised} messages on the topics of the touch, {found} were found")]
     MessageCount {
         /// by the index
         promised: u64,
@@ -172,6 +189,9 @@ pub enum BadMessage {
     /// The header names another frame than the first message of the topic did.
     #[error("frame_changed")]
     FrameChanged,
+    /// A transform whose stamp the other links between the two frames never had.
+    #[error("transforms_apart")]
+    TransformsApart,
 }
 
 /// How many messages were left out for one reason.
@@ -185,31 +205,4 @@ pub struct BadCount {
     pub path: PathBuf,
     /// where in that file the first is
     pub place: FilePlace,
-}
-
-/// The two topics exist, with the right types.
-pub(super) fn check_topics(path: &Path, topics: &Topics, found: &[TopicInfo]) -> Result<(), RecordingError> {
-    for kind in topics.kinds() {
-        let topic = topics.name(kind);
-        let Some(info) = found.iter().find(|info| info.name == topic) else {
-            let shown: Vec<_> = found.iter().map(|info| format!("{} ({})", info.name, info.type_name)).collect();
-            let found = if shown.is_empty() { "no topics".to_owned() } else { shown.join(", ") };
-            let (path, topic) = (path.to_owned(), topic.to_owned());
-            return Err(RecordingError::MissingTopic { path, topic, flag: kind.flag(), found });
-        };
-        check_topic(path, kind, info)?;
-    }
-    Ok(())
-}
-
-/// One topic has the type and encoding of its kind.
-pub(super) fn check_topic(path: &Path, kind: TopicKind, info: &TopicInfo) -> Result<(), RecordingError> {
-    let why = if info.type_name != kind.type_name() {
-        format!("{}, not {}; choose another with {}", info.type_name, kind.type_name(), kind.flag())
-    } else if info.encoding != "cdr" {
-        format!("encoded as {:?}; only ROS 2's \"cdr\" can be read", info.encoding)
-    } else {
-        return Ok(());
-    };
-    Err(RecordingError::WrongTopic { path: path.to_owned(), topic: info.name.clone(), why })
 }

@@ -88,6 +88,18 @@ impl ByteStream {
         Ok(Some((opcode, len)))
     }
 
+    /// Appends the next `len` bytes, a few; `false` where the file ends before them.
+    pub fn front(&mut self, len: u64, into: &mut Vec<u8>) -> Result<bool, Damage> {
+        let start = into.len();
+        let left = self.input.by_ref().take(len).read_to_end(into)? as u64;
+        if left > 0 && left < len {
+            return Err(Damage::Cut { wanted: len, left });
+        }
+        self.at += left;
+        self.crc.update(&into[start..]);
+        Ok(left > 0)
+    }
+
     /// Appends the next `len` bytes to `into`.
     pub fn load(&mut self, len: u64, into: &mut Vec<u8>) -> Result<(), Damage> {
         self.check_left(len)?;
@@ -144,6 +156,12 @@ impl<'a> Fields<'a> {
         let (front, rest) = self.0.split_first_chunk().ok_or(Damage::Field(what))?;
         self.0 = rest;
         Ok(*front)
+    }
+
+    /// What has its length in front, in four bytes.
+    pub fn sized(&mut self, what: &'static str) -> Result<&'a [u8], Damage> {
+        let bytes = self.u32(what)?;
+        self.bytes(bytes.into(), what)
     }
 
     pub fn u8(&mut self, what: &'static str) -> Result<u8, Damage> {

@@ -12,25 +12,29 @@ use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::error::check_topic;
 use super::framing::{ByteStream, Fields, HEAD_BYTES, NameBytes, check_crc, check_length, op, split_record};
-use super::{Damage, FilePlace, RawMessage, RecordingError, RecordingFile, TopicInfo, TopicKind, Topics};
+use super::topics::check_topic;
+use super::{
+    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout, TopicInfo, TopicKind,
+};
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 /// Footer record and the magic behind it.
 const TAIL_BYTES: usize = HEAD_BYTES + 20 + MAGIC.len();
-/// Topic, place of the payload in the records, log time, ns.
-type FoundMessage = (TopicKind, Range<usize>, i64);
+/// Topic and how it is read, place of the payload in the records, log time, ns.
+type FoundMessage = (TopicKind, MessageFormat, Range<usize>, i64);
 
 /// Channel, sequence, log time and publish time in front of a message's payload.
 const MESSAGE_HEAD_BYTES: usize = 22;
 
-/// Messages of the two topics of one MCAP file, in the order of the file.
+/// Messages of the topics of a touch of one MCAP file, in the order of the file.
 pub(super) struct McapReader {
     path: PathBuf,
-    topics: Topics,
+    layout: RecordingLayout,
     stream: ByteStream,
     described: Described,
+    /// What the channels give that are read.
+    read: BTreeMap<u16, (TopicKind, MessageFormat)>,
     /// One record as it lies in the file.
     packed: Vec<u8>,
     /// Records of the current chunk.
@@ -44,35 +48,40 @@ pub(super) struct McapReader {
 }
 
 impl McapReader {
-    /// Opens a file, or a stream that unpacks one, and learns which of the two topics it has.
+    /// Opens a file, or a stream that unpacks one, and learns which of the topics of a touch it has.
     ///
-    /// With a usable index at the end of the file that is one seek; without, records are read until both topics are
+    /// With a usable index at the end of the file that is one seek; without, records are read until all of them are
     /// described. Damage met on that search is returned beside the reader.
-    pub fn open(path: &Path, topics: &Topics, packed: bool) -> Result<(Self, Option<RecordingError>), RecordingError> {
+    pub fn open(
+        path: &Path,
+        layout: &RecordingLayout,
+        packed: bool,
+    ) -> Result<(Self, Option<RecordingError>), RecordingError> {
         let index = if packed { None } else { Index::read(path) };
-        let mut reader = Self::start(path, topics, packed)?;
+        let mut reader = Self::start(path, layout, packed)?;
         reader.truncated = !packed && index.is_none();
         if let Some(index) = index {
-            reader.promised = index.promised(topics);
-            if index.described.has(topics) || index.checked {
-                reader.described = index.described;
+            reader.promised = index.promised(layout);
+            if index.described.has(layout) || index.checked {
+                reader.knows(index.described);
                 return Ok((reader, None));
             }
         }
-        let mut scout = Self::start(path, topics, packed)?;
+        let mut scout = Self::start(path, layout, packed)?;
         let damage = scout.describe().err();
-        reader.described = scout.described;
+        reader.knows(scout.described);
         Ok((reader, damage))
     }
 
-    fn start(path: &Path, topics: &Topics, packed: bool) -> Result<Self, RecordingError> {
+    fn start(path: &Path, layout: &RecordingLayout, packed: bool) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.to_owned(), source };
         let stream = ByteStream::open(path, packed).map_err(io)?;
         let mut reader = Self {
             path: path.to_owned(),
-            topics: topics.clone(),
+            layout: layout.clone(),
             stream,
             described: Described::default(),
+            read: BTreeMap::new(),
             packed: Vec::new(),
             records: Vec::new(),
             next: 0,
@@ -86,9 +95,17 @@ impl McapReader {
         Ok(reader)
     }
 
-    /// Reads on until both topics are described.
+    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask for the topics.
+    fn knows(&mut self, described: Described) {
+        let read = described.channels.iter();
+        let read = read.filter_map(|(id, info)| Some((*id, check_topic(&self.path, &self.layout, info).ok()??)));
+        self.read = read.collect();
+        self.described = described;
+    }
+
+    /// Reads on until all of them are described.
     fn describe(&mut self) -> Result<(), RecordingError> {
-        while !self.described.has(&self.topics) && self.advance()?.is_some() {}
+        while !self.described.has(&self.layout) && self.advance()?.is_some() {}
         Ok(())
     }
 
@@ -109,7 +126,7 @@ impl McapReader {
         }
     }
 
-    /// Takes one record of the current chunk; a message of the two topics gives its payload's place in `records`.
+    /// Takes one record of the current chunk; a message of the topics of a touch gives its payload's place in `records`.
     fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
         let (opcode, body) = split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;
         let start = self.next + HEAD_BYTES;
@@ -119,24 +136,25 @@ impl McapReader {
             op::CHANNEL => {
                 let id = self.described.add_channel(body).map_err(|damage| self.damaged(damage))?;
                 let info = &self.described.channels[&id];
-                if let Some(kind) = self.topics.kind_of(&info.name) {
-                    check_topic(&self.path, kind, info)?;
-                }
+                match check_topic(&self.path, &self.layout, info)? {
+                    Some(read) => self.read.insert(id, read),
+                    None => self.read.remove(&id),
+                };
             }
             op::MESSAGE => {
                 let mut head = Fields(body);
                 let channel = head.u16("channel of a message").map_err(|damage| self.damaged(damage))?;
-                let Some(info) = self.described.channels.get(&channel) else {
+                if !self.described.channels.contains_key(&channel) {
                     return Err(self.damaged(Damage::Undescribed { what: "channel", id: channel }));
-                };
+                }
                 if body.len() < MESSAGE_HEAD_BYTES {
                     return Err(self.damaged(Damage::Field("head of a message")));
                 }
-                let kind = self.topics.kind_of(&info.name);
                 let mut logged = || head.u32("sequence of a message").and_then(|_| head.u64("log time of a message"));
                 let logged = logged().map_err(|damage| self.damaged(damage))?;
                 let logged_ns = i64::try_from(logged).unwrap_or(i64::MAX);
-                return Ok(kind.map(|kind| (kind, start + MESSAGE_HEAD_BYTES..self.next, logged_ns)));
+                let payload = start + MESSAGE_HEAD_BYTES..self.next;
+                return Ok(self.read.get(&channel).map(|&(kind, format)| (kind, format, payload, logged_ns)));
             }
             _ => {}
         }
@@ -193,7 +211,7 @@ impl RecordingFile for McapReader {
     }
 
     fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError> {
-        let Some((kind, payload, logged_ns)) = self.advance()? else {
+        let Some((kind, format, payload, logged_ns)) = self.advance()? else {
             return match self.promised {
                 Some(promised) if promised != self.found => {
                     Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
@@ -203,7 +221,7 @@ impl RecordingFile for McapReader {
         };
         self.found += 1;
         let (payload, place) = (Cow::Borrowed(&self.records[payload]), FilePlace::Byte(self.at));
-        Ok(Some(RawMessage { kind, payload, logged_ns, place }))
+        Ok(Some(RawMessage { kind, format, payload, logged_ns, place }))
     }
 }
 
@@ -266,8 +284,8 @@ impl Described {
         Ok(id)
     }
 
-    fn has(&self, topics: &Topics) -> bool {
-        topics.kinds().into_iter().all(|kind| self.channels.values().any(|info| info.name == topics.name(kind)))
+    fn has(&self, layout: &RecordingLayout) -> bool {
+        layout.needed().all(|kind| self.channels.values().any(|info| layout.is_topic(kind, &info.name)))
     }
 }
 
@@ -324,10 +342,10 @@ impl Index {
         Ok(())
     }
 
-    /// Messages on the two topics.
-    fn promised(&self, topics: &Topics) -> Option<u64> {
+    /// Messages on the topics of a touch.
+    fn promised(&self, layout: &RecordingLayout) -> Option<u64> {
         let counts = self.counts.as_ref()?;
-        let wanted = |id: &u16| self.described.channels.get(id).is_some_and(|c| topics.kind_of(&c.name).is_some());
+        let wanted = |id: &u16| self.described.channels.get(id).is_some_and(|c| layout.kind_of(&c.name).is_some());
         Some(counts.iter().filter(|(id, _)| wanted(id)).fold(0, |sum: u64, (_, n)| sum.saturating_add(*n)))
     }
 }

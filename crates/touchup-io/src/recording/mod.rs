@@ -1,27 +1,45 @@
-//! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped`) and wrenches
-//! (`geometry_msgs/msg/WrenchStamped`), or in place of the poses the markers on the stylus
-//! (`sensor_msgs/msg/PointCloud2`), read from MCAP and rosbag2 SQLite files, written as MCAP.
+//! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped` and other types that hold one, or a tree of transforms) and
+//! wrenches (`geometry_msgs/msg/WrenchStamped` and others), or in place of the poses the markers on the stylus
+//! (`sensor_msgs/msg/PointCloud2`), read from MCAP, rosbag2 SQLite files, ROS 1 bags and tables of numbers, written as MCAP.
 //!
 //! Both deal in [`touchup_core::stylus::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
 //! does not grow with the recording, and no length found in a file is believed before it is checked.
 //! [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open; [`write_recording`] puts one
 //! under its final name only when it is whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
 
+mod bag;
+mod bag_index;
 mod cdr;
+mod columns;
+mod copy;
 mod db3;
+mod decode;
 mod error;
 mod folder;
 mod framing;
+mod intake;
+mod layout;
 mod mcap;
+mod message_type;
+mod number_table;
 mod point_cloud;
 mod reader;
 mod resume;
 mod segments;
+mod topics;
+mod transforms;
+mod units;
+mod wire;
 mod writer;
 
 pub use crate::file_error::FilePlace;
+pub use columns::{TableColumns, WrenchAxes};
+pub use copy::{CopiedRecording, copy_recording};
 pub use error::{BadCount, BadMessage, Damage, RecordingError};
 pub(crate) use folder::{is_of_recording, own_files};
+pub use layout::{RecordingLayout, Topics, TransformFrames};
+use layout::{TopicInfo, TopicKind};
+use message_type::MessageFormat;
 pub use reader::RecordingReader;
 pub use segments::SegmentedWriter;
 pub use writer::{RecordingWriter, write_recording};
@@ -79,106 +97,27 @@ touchup_core::names! {
     }
 }
 
-/// Names of the topics that make a touch.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Topics {
-    /// `geometry_msgs/msg/PoseStamped`: tip T in the object frame O, m.
-    pub pose: String,
-    /// `geometry_msgs/msg/WrenchStamped`: wrench of the object on the stylus, N and N·m.
-    pub wrench: String,
-    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is read in place of the
-    /// pose, and written beside it.
-    pub markers: Option<String>,
-}
-
-impl Default for Topics {
-    /// `/stylus/pose` and `/stylus/wrench`, no markers.
-    fn default() -> Self {
-        Self { pose: "/stylus/pose".into(), wrench: "/stylus/wrench".into(), markers: None }
-    }
-}
-
-impl Topics {
-    fn name(&self, kind: TopicKind) -> &str {
-        match kind {
-            TopicKind::Pose => &self.pose,
-            TopicKind::Wrench => &self.wrench,
-            TopicKind::Markers => self.markers.as_deref().unwrap_or_default(),
-        }
-    }
-
-    /// The two that are read: the topic of the pose, and that of the wrench.
-    fn kinds(&self) -> [TopicKind; 2] {
-        [if self.markers.is_some() { TopicKind::Markers } else { TopicKind::Pose }, TopicKind::Wrench]
-    }
-
-    fn kind_of(&self, name: &str) -> Option<TopicKind> {
-        self.kinds().into_iter().find(|kind| self.name(*kind) == name)
-    }
-}
-
-/// Which of the topics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum TopicKind {
-    Pose,
-    Wrench,
-    Markers,
-}
-
-impl TopicKind {
-    fn type_name(self) -> &'static str {
-        match self {
-            Self::Pose => "geometry_msgs/msg/PoseStamped",
-            Self::Wrench => "geometry_msgs/msg/WrenchStamped",
-            Self::Markers => "sensor_msgs/msg/PointCloud2",
-        }
-    }
-
-    fn flag(self) -> &'static str {
-        match self {
-            Self::Pose => "--pose-topic",
-            Self::Wrench => "--wrench-topic",
-            Self::Markers => "--markers-topic",
-        }
-    }
-}
-
-/// A topic as a file describes it.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct TopicInfo {
-    name: String,
-    type_name: String,
-    /// `cdr` in every ROS 2 recording.
-    encoding: String,
-}
-
-impl TopicInfo {
-    /// Memory of its names, bytes.
-    fn name_bytes(&self) -> usize {
-        self.name.len() + self.type_name.len() + self.encoding.len()
-    }
-}
-
 /// A message as it lies in the file.
 struct RawMessage<'a> {
     kind: TopicKind,
+    format: MessageFormat,
     payload: Cow<'a, [u8]>,
     /// when the recorder took it, ns
     logged_ns: i64,
     place: FilePlace,
 }
 
-/// One file of a recording: its messages on the two topics, one after another.
+/// One file of a recording: its messages on the topics of a touch, one after another.
 trait RecordingFile: Send {
     /// Topics that are known so far.
     fn topics(&self) -> Vec<TopicInfo>;
 
-    /// Messages on the two topics, where the file says how many.
+    /// Messages on these topics, where the file says how many.
     fn promised(&self) -> Option<u64>;
 
     /// It has lost its end, or a part of it is elsewhere.
     fn truncated(&self) -> bool;
 
-    /// The next message of the two topics; `None` at the end.
+    /// The next message of these topics; `None` at the end.
     fn next_message(&mut self) -> Result<Option<RawMessage<'_>>, RecordingError>;
 }

@@ -6,19 +6,28 @@ use std::io::{self, Read};
 use std::iter::FusedIterator;
 use std::path::{Path, PathBuf};
 
-use super::cdr::{decode_pose, decode_wrench, unpack};
+use super::bag::BagReader;
+use super::bag_index;
+use super::columns::WrenchAxes;
 use super::db3::{self, Db3Reader};
-use super::error::{BadCount, check_topics};
+use super::decode::Decoded;
+use super::error::BadCount;
 use super::folder::files_of;
+use super::intake::{Intake, decode_raw};
 use super::mcap::{self, McapReader};
-use super::point_cloud::decode_markers;
+use super::number_table::{NumberTable, is_table};
+use super::topics::check_topics;
+use super::transforms::TransformTree;
 use super::{
-    BadMessage, RawMessage, Record, RecordingError, RecordingFile, StampSource, TopicInfo, TopicKind, Topics,
-    ZSTD_MAGIC,
+    BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource, TopicInfo, TopicKind,
+    TransformFrames, ZSTD_MAGIC,
 };
+use touchup_core::numeric::counted;
 use touchup_core::stylus::Message;
 
 const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
+/// Frames of a table, which names none.
+const TABLE_FRAMES: [&str; 2] = ["object", "stylus"];
 
 /// Poses and wrenches of a recording, one after another.
 ///
@@ -39,9 +48,11 @@ const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
 /// # Ok::<(), touchup_io::recording::RecordingError>(())
 /// ```
 pub struct RecordingReader {
-    topics: Topics,
+    layout: RecordingLayout,
     path: PathBuf,
     source: Option<Box<dyn RecordingFile>>,
+    /// in place of the files, where the recording is a table
+    table: Option<NumberTable>,
     rest: VecDeque<PathBuf>,
     intake: Intake,
     stamps: StampSource,
@@ -50,18 +61,33 @@ pub struct RecordingReader {
 }
 
 impl RecordingReader {
-    /// Opens a recording: an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, or a rosbag2 folder
+    /// Opens a recording, whose topics a [`RecordingLayout`] or [`super::Topics`] name: a table by its ending, else an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, a `.bag` of ROS 1, or a rosbag2 folder
     /// with its `metadata.yaml`, whose files are read in the order named there; without it the .mcap files of the folder, in
     /// the order of their names. Their content decides the format.
     ///
     /// # Errors
-    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does not have the two topics; [`RecordingError::Damaged`] when damage hides whether it has them;
+    /// [`RecordingError::Frames`] when a pose is wanted from transforms and they do not have it;
+    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does not have the topics; [`RecordingError::Damaged`] when damage hides whether it has them;
     /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
-    pub fn open(path: &Path, topics: &Topics) -> Result<Self, RecordingError> {
+    pub fn open(path: &Path, layout: impl Into<RecordingLayout>) -> Result<Self, RecordingError> {
+        let layout = layout.into();
+        if is_table(path) {
+            return Self::of_table(path, &layout);
+        }
+        let mut reader = Self::of_messages(path, &layout)?;
+        if let Some(frames) = &layout.frames {
+            let tree = Self::of_messages(path, &layout)?.read_tree(frames);
+            reader.intake.take_chain(tree.into_chain(frames, path)?);
+        }
+        Ok(reader)
+    }
+
+    fn of_messages(path: &Path, layout: &RecordingLayout) -> Result<Self, RecordingError> {
         let mut reader = Self {
-            topics: topics.clone(),
+            layout: layout.clone(),
             path: path.to_owned(),
             source: None,
+            table: None,
             rest: files_of(path)?,
             intake: Intake::default(),
             stamps: StampSource::default(),
@@ -75,12 +101,31 @@ impl RecordingReader {
         Ok(reader)
     }
 
+    /// A table, each of whose rows is a pose and a wrench.
+    fn of_table(path: &Path, layout: &RecordingLayout) -> Result<Self, RecordingError> {
+        let table = NumberTable::open(path, &layout.columns)?;
+        let [object, stylus] = TABLE_FRAMES;
+        let wrench_frame = if table.wrench_axes() == WrenchAxes::Pose { object } else { stylus };
+        let intake = Intake::in_frames(object, wrench_frame);
+        Ok(Self {
+            layout: layout.clone(),
+            path: path.to_owned(),
+            source: None,
+            table: Some(table),
+            rest: VecDeque::new(),
+            intake,
+            stamps: StampSource::default(),
+            message_count: None,
+            truncated: false,
+        })
+    }
+
     /// The same, each message stamped by another of its times.
     pub fn stamped_by(self, stamps: StampSource) -> Self {
         Self { stamps, ..self }
     }
 
-    /// Messages on the two topics, for a progress bar; `None` when a file does not say (MCAP without its end).
+    /// Messages on the topics of a touch, for a progress bar; `None` when a file does not say (MCAP without its end).
     pub fn message_count(&self) -> Option<u64> {
         self.message_count
     }
@@ -100,6 +145,25 @@ impl RecordingReader {
         &self.intake.bad
     }
 
+    /// What a better recording would not lack, a line each: messages left out, and a lost end.
+    pub fn losses(&self) -> Vec<String> {
+        let line = |(reason, bad): (&BadMessage, &BadCount)| {
+            let (path, place) = (bad.path.display(), &bad.place);
+            let messages = counted(bad.poses + bad.wrenches, "message", "messages");
+            format!("{messages} {reason}, the first in {path} at {place}")
+        };
+        let mut losses: Vec<_> = self.bad_messages().iter().map(line).collect();
+        if self.truncated {
+            losses.push("the recording has lost its end; what is there was read".to_owned());
+        }
+        losses
+    }
+
+    /// The file that is being read, or was last.
+    pub(super) fn source_path(&self) -> &Path {
+        &self.path
+    }
+
     /// A file has lost its end (the recorder was killed, or a copy was cut); what is there is read all the same.
     pub fn truncated(&self) -> bool {
         self.truncated
@@ -111,7 +175,7 @@ impl RecordingReader {
         let mut found: Vec<TopicInfo> = Vec::new();
         let mut first_damage = None;
         for file in &self.rest {
-            let (source, damage) = open_file(file, &self.topics)?;
+            let (source, damage) = open_file(file, &self.layout)?;
             first_damage = first_damage.or(damage);
             self.truncated |= source.truncated();
             self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
@@ -120,16 +184,39 @@ impl RecordingReader {
             found.dedup();
             first = first.or(Some(source));
         }
-        match (check_topics(&self.path, &self.topics, &found), first_damage) {
+        match (check_topics(&self.path, &self.layout, &found), first_damage) {
             (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
             (checked, _) => checked.map(|()| first),
         }
+    }
+
+    /// The tree of transforms as far as it is needed; of what is damaged, what comes before.
+    fn read_tree(mut self, frames: &TransformFrames) -> TransformTree {
+        let mut tree = TransformTree::default();
+        while !tree.is_enough(frames)
+            && let Some(source) = &mut self.source
+        {
+            match source.next_message() {
+                Ok(Some(raw)) => {
+                    if let Ok(Decoded::Transforms(links)) = decode_raw(&raw) {
+                        tree.add(links, raw.kind == TopicKind::StaticTransforms);
+                    }
+                }
+                Ok(None) => {
+                    let next = self.rest.pop_front().and_then(|path| open_file(&path, &self.layout).ok());
+                    self.source = next.map(|(source, _)| source);
+                }
+                Err(_) => break,
+            }
+        }
+        tree
     }
 
     /// The next pose, wrench or frame of markers; after damage the error, then `None`.
     pub fn next_record(&mut self) -> Option<Result<Record, RecordingError>> {
         let next = self.advance();
         if next.is_err() {
+            self.table = None;
             self.source = None;
             self.rest.clear();
         }
@@ -138,12 +225,19 @@ impl RecordingReader {
 
     fn advance(&mut self) -> Result<Option<Record>, RecordingError> {
         loop {
+            if let Some(second) = self.intake.second.take() {
+                return Ok(Some(second));
+            }
+            if let Some(table) = &mut self.table {
+                let Some(row) = table.next_row()? else { return Ok(None) };
+                if let Some(record) = self.intake.accept_row(row, table.place(), &self.path) {
+                    return Ok(Some(record));
+                }
+                continue;
+            }
             let Some(source) = &mut self.source else { return Ok(None) };
             if let Some(raw) = source.next_message()? {
-                if let Some(mut record) = self.intake.accept(&raw, &self.path) {
-                    if self.stamps == StampSource::Log {
-                        record.set_stamp(raw.logged_ns);
-                    }
+                if let Some(record) = self.intake.accept(&raw, &self.path, self.stamps) {
                     return Ok(Some(record));
                 }
                 continue;
@@ -151,7 +245,7 @@ impl RecordingReader {
             self.truncated |= source.truncated();
             self.source = None;
             let Some(path) = self.rest.pop_front() else { return Ok(None) };
-            self.source = Some(open_file(&path, &self.topics)?.0);
+            self.source = Some(open_file(&path, &self.layout)?.0);
             self.path = path;
         }
     }
@@ -171,50 +265,11 @@ impl Iterator for RecordingReader {
 
 impl FusedIterator for RecordingReader {}
 
-/// Decodes messages, and counts frames and unusable messages.
-#[derive(Default)]
-struct Intake {
-    pose_frame: Option<String>,
-    wrench_frame: Option<String>,
-    bad: BTreeMap<BadMessage, BadCount>,
-}
-
-impl Intake {
-    fn accept(&mut self, raw: &RawMessage, path: &Path) -> Option<Record> {
-        let decoded = self.decode(raw);
-        if let Err(reason) = decoded {
-            let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place: raw.place };
-            let bad = self.bad.entry(reason).or_insert(first);
-            match raw.kind {
-                TopicKind::Pose | TopicKind::Markers => bad.poses += 1,
-                TopicKind::Wrench => bad.wrenches += 1,
-            }
-        }
-        decoded.ok()
-    }
-
-    fn decode(&mut self, raw: &RawMessage) -> Result<Record, BadMessage> {
-        let payload = unpack(&raw.payload)?;
-        let (frame, record) = match raw.kind {
-            TopicKind::Pose => decode_pose(&payload).map(|(frame, pose)| (frame, Message::Pose(pose).into()))?,
-            TopicKind::Wrench => {
-                decode_wrench(&payload).map(|(frame, wrench)| (frame, Message::Wrench(wrench).into()))?
-            }
-            TopicKind::Markers => {
-                decode_markers(&payload).map(|(frame, seen)| (frame, Record::Markers(Box::new(seen))))?
-            }
-        };
-        let first = if raw.kind == TopicKind::Wrench { &mut self.wrench_frame } else { &mut self.pose_frame };
-        if *first.get_or_insert_with(|| frame.clone().into_owned()) == frame {
-            Ok(record)
-        } else {
-            Err(BadMessage::FrameChanged)
-        }
-    }
-}
-
 /// Opens one file of a recording; with the damage that was met on the search for its topics.
-fn open_file(path: &Path, topics: &Topics) -> Result<(Box<dyn RecordingFile>, Option<RecordingError>), RecordingError> {
+fn open_file(
+    path: &Path,
+    layout: &RecordingLayout,
+) -> Result<(Box<dyn RecordingFile>, Option<RecordingError>), RecordingError> {
     let io = |source| RecordingError::Io { path: path.to_owned(), source };
     let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
     let packed = front.starts_with(&ZSTD_MAGIC);
@@ -223,10 +278,13 @@ fn open_file(path: &Path, topics: &Topics) -> Result<(Box<dyn RecordingFile>, Op
         front = unpacked.map_err(io)?;
     }
     if front.starts_with(&mcap::MAGIC) {
-        let (reader, damage) = McapReader::open(path, topics, packed)?;
+        let (reader, damage) = McapReader::open(path, layout, packed)?;
         Ok((Box::new(reader), damage))
     } else if front == db3::MAGIC {
-        Ok((Box::new(Db3Reader::open(path, topics, packed)?), None))
+        Ok((Box::new(Db3Reader::open(path, layout, packed)?), None))
+    } else if front.starts_with(bag_index::MAGIC) && !packed {
+        let (reader, damage) = BagReader::open(path, layout)?;
+        Ok((Box::new(reader), damage))
     } else {
         Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
     }
@@ -242,8 +300,11 @@ fn describe_front(front: &[u8]) -> String {
     if front.is_empty() {
         "the file is empty".to_owned()
     } else if front.starts_with(ROS1_MAGIC) {
-        "it is a ROS 1 bag; convert it with `rosbags-convert`".to_owned()
+        "it is a ROS 1 bag of another version than 2.0, or packed as a whole; unpack it, or convert it with `rosbags-convert`".to_owned()
     } else {
-        format!("it begins with \"{}\", neither MCAP nor rosbag2's SQLite", front.escape_ascii())
+        format!(
+            "it begins with \"{}\", neither MCAP nor rosbag2's SQLite nor a ROS 1 bag; a table must end in .csv, .tsv, .txt or .log",
+            front.escape_ascii()
+        )
     }
 }

@@ -33,9 +33,10 @@ const NO_QOS_PROFILES: &str = "[]";
 
 fn definition(kind: TopicKind) -> String {
     let (mut text, parts) = match kind {
-        TopicKind::Pose => (POSE_STAMPED.to_owned(), [HEADER, TIME, POSE, POINT, QUATERNION].as_slice()),
         TopicKind::Wrench => (WRENCH_STAMPED.to_owned(), [HEADER, TIME, WRENCH, VECTOR3].as_slice()),
         TopicKind::Markers => (POINT_CLOUD.to_owned(), [HEADER, TIME, POINT_FIELD].as_slice()),
+        // what is written of a pose, however it was read
+        _ => (POSE_STAMPED.to_owned(), [HEADER, TIME, POSE, POINT, QUATERNION].as_slice()),
     };
     for (name, fields) in parts {
         text.push_str(&format!("{RULE}\nMSG: {name}\n{fields}"));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use touchup_core::stylus::{Placement, Sample, WrenchFrame};
-use touchup_io::recording::{StampSource, Topics};
+use touchup_io::recording::{RecordingLayout, StampSource};
 
 use crate::replay::{Recording, ReplayError, Replayed, each_sample, marker_filter};
 use crate::scene::Scene;
@@ -21,9 +21,11 @@ impl CalibrationRecording {
     ///
     /// # Errors
     /// [`ReplayError::Read`]
-    pub fn open(path: &Path, topics: &Topics) -> Result<Self, ReplayError> {
-        let recording = Recording::open(path, topics, StampSource::Header)?;
-        Ok(Self { path: path.to_owned(), recording, markers_topic: topics.markers.clone() })
+    pub fn open(path: &Path, layout: impl Into<RecordingLayout>) -> Result<Self, ReplayError> {
+        let layout = layout.into();
+        let markers_topic = layout.topics.markers.clone();
+        let recording = Recording::open(path, layout, StampSource::Header)?;
+        Ok(Self { path: path.to_owned(), recording, markers_topic })
     }
 
     /// How many messages it has, where it says so.

@@ -33,6 +33,7 @@ use touchup_core::parameters;
 use touchup_core::reconstruct::{PatchParams, UncertaintyParams};
 use touchup_core::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
+use touchup_io::recording::TableColumns;
 
 parameters! {
     /// The parts of a scene. `None`: not built. Those with a default are built unless the scene says `off`.
@@ -43,6 +44,9 @@ parameters! {
         /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off: only messages of equal stamp
         /// pair.
         sync: Option<SyncParams> = Some(Default::default()), "sync";
+        /// The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their names in its first line, each with its
+        /// unit, as in x_mm or `x [mm]`. Not named: the usual names are looked for, and those of RTDE.
+        columns: Option<TableColumns> = None, "columns";
         /// Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and never applied
         /// unasked. It has no keys. Off: it is not estimated.
         clock: Option<ClockSection> = Some(Default::default()), "clock";
@@ -97,6 +101,11 @@ impl Scene {
     /// [`SceneError`], with the path.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         Self::read_with_text(path).map(|(scene, _)| scene)
+    }
+
+    /// The columns of a table, as far as they are named.
+    pub fn table_columns(&self) -> TableColumns {
+        self.columns.clone().unwrap_or_default()
     }
 
     /// Reads and checks a scene, and keeps its text for [`Self::edited`].

@@ -306,8 +306,8 @@ fn messages_that_cannot_be_used_are_counted_and_reading_goes_on() {
 fn other_files_are_named_for_what_they_are() {
     let folder = tempfile::tempdir().unwrap();
     let text = |name: &str, bytes: &[u8]| read(&put(folder.path(), name, bytes)).error.unwrap().to_string();
-    assert!(text("empty.mcap", b"").contains("empty.mcap: not a ROS 2 recording: the file is empty"));
-    assert!(text("old.bag", b"#ROSBAG V2.0\n").contains("rosbags-convert"));
+    assert!(text("empty.mcap", b"").contains("empty.mcap: not a recording: the file is empty"));
+    assert!(text("old.bag", b"#ROSBAG V1.2\n").contains("rosbags-convert"));
     assert!(text("mesh.stl", b"solid part\n").contains("solid part"));
     let path = folder.path().join("other.db3");
     rusqlite::Connection::open(&path).unwrap().execute_batch("CREATE TABLE t(x)").unwrap();

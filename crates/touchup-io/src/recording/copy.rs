@@ -1,0 +1,82 @@
+//! Any recording that can be read, written as MCAP.
+
+use std::path::Path;
+
+use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
+use crate::atomic::AtomicFile;
+use touchup_core::stylus::Message;
+
+/// The frame of messages that name none; one for poses and wrenches, as those that name none are in the same axes.
+const UNNAMED: &str = "unnamed";
+
+/// What was written.
+#[derive(Debug, Default)]
+pub struct CopiedRecording {
+    /// poses, or frames of markers
+    pub poses: u64,
+    /// wrenches
+    pub wrenches: u64,
+    /// frame of the poses
+    pub pose_frame: String,
+    /// frame in which the wrenches are
+    pub wrench_frame: String,
+    /// where the recording is damaged; what comes before was written
+    pub damage: Option<RecordingError>,
+}
+
+/// Writes what is read of a recording to `path`, which is never half a file ([`AtomicFile`]).
+///
+/// - `topics`: under which it is written.
+/// - `at_each`: called after each record, to show the progress.
+///
+/// # Errors
+/// As [`super::write_recording`]; [`RecordingError::NotARecording`] where it holds no pose or no wrench that can be used, and its
+/// damage where that comes before both.
+pub fn copy_recording(
+    reader: &mut RecordingReader,
+    path: &Path,
+    topics: &Topics,
+    at_each: &mut dyn FnMut(),
+) -> Result<CopiedRecording, RecordingError> {
+    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let mut file = AtomicFile::create(path).map_err(io)?;
+    let mut writer = RecordingWriter::new(&mut file, topics)?;
+    let mut copied = CopiedRecording::default();
+    while let Some(record) = reader.next_record() {
+        let record = match record {
+            Ok(record) => record,
+            Err(damage) => {
+                copied.damage = Some(damage);
+                continue;
+            }
+        };
+        let is_wrench = matches!(record, Record::Message(Message::Wrench(_)));
+        let (count, frame) = match is_wrench {
+            true => (&mut copied.wrenches, reader.wrench_frame()),
+            false => (&mut copied.poses, reader.pose_frame()),
+        };
+        *count += 1;
+        writer.write(record, frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED))?;
+        at_each();
+    }
+    writer.finish()?;
+    if copied.poses == 0 || copied.wrenches == 0 {
+        let what = if copied.poses == 0 { "pose" } else { "wrench" };
+        return Err(copied.damage.unwrap_or_else(|| reader.without(what)));
+    }
+    file.commit().map_err(io)?;
+    let own = |frame: Option<&str>| frame.unwrap_or_default().to_owned();
+    (copied.pose_frame, copied.wrench_frame) = (own(reader.pose_frame()), own(reader.wrench_frame()));
+    Ok(copied)
+}
+
+impl RecordingReader {
+    /// It has been read, and there was none.
+    fn without(&self, what: &str) -> RecordingError {
+        let left_out = self.bad_messages().iter().map(|(reason, bad)| format!("{} {reason}", bad.poses + bad.wrenches));
+        let left_out: Vec<_> = left_out.collect();
+        let left_out = if left_out.is_empty() { String::new() } else { format!("; left out: {}", left_out.join(", ")) };
+        let reason = format!("no {what} in it can be used{left_out}");
+        RecordingError::NotARecording { path: self.source_path().to_owned(), reason }
+    }
+}

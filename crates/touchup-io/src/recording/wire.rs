@@ -1,0 +1,152 @@
+//! The numbers and names of a ROS message, one after another, in either of the two ways in which ROS lays them out.
+//!
+//! ROS 2: CDR, XCDR version 1, in either byte order, each number at a multiple of its size, strings with a final zero. ROS 1: little
+//! endian, nothing between the fields. No length is believed before it is compared with the bytes that are there.
+
+use super::error::BadMessage;
+
+/// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred transforms for a tree of frames.
+pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;
+/// CDR payloads are padded to four bytes by some middlewares; more left over is another type.
+const MAX_PADDING_BYTES: usize = 3;
+/// Longest name of a frame: those of a tree are kept.
+const MAX_FRAME_NAME_BYTES: usize = 1024;
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// How the messages of a topic are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wire {
+    /// of ROS 2, with its four bytes of encapsulation
+    Cdr,
+    /// of ROS 1
+    Ros1,
+}
+
+impl Wire {
+    /// By the name that a recording gives the encoding.
+    pub fn of(encoding: &str) -> Option<Self> {
+        match encoding {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            _ => None,
+        }
+    }
+}
+
+/// Stamp and frame of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header<'a> {
+    pub stamp_ns: i64,
+    pub frame: &'a str,
+}
+
+/// What is left of a payload.
+pub(super) struct WireReader<'a> {
+    wire: Wire,
+    is_big: bool,
+    body: &'a [u8],
+    at: usize,
+}
+
+impl<'a> WireReader<'a> {
+    /// # Errors
+    /// [`BadMessage::Malformed`] for a payload that is too long, or whose encapsulation is not that of XCDR version 1.
+    pub fn new(wire: Wire, payload: &'a [u8]) -> Result<Self, BadMessage> {
+        let (is_big, body) = match (wire, payload.split_first_chunk()) {
+            (Wire::Ros1, _) => (false, payload),
+            (Wire::Cdr, Some((&[0, order @ (0 | 1), _, _], body))) => (order == 0, body),
+            (Wire::Cdr, _) => return Err(BadMessage::Malformed),
+        };
+        let is_short = body.len() <= MAX_MESSAGE_BYTES;
+        if is_short { Ok(Self { wire, is_big, body, at: 0 }) } else { Err(BadMessage::Malformed) }
+    }
+
+    fn bytes(&mut self, count: usize) -> Result<&'a [u8], BadMessage> {
+        let end = self.at.checked_add(count).ok_or(BadMessage::Malformed)?;
+        let bytes = self.body.get(self.at..end).ok_or(BadMessage::Malformed)?;
+        self.at = end;
+        Ok(bytes)
+    }
+
+    fn number<const N: usize>(&mut self) -> Result<[u8; N], BadMessage> {
+        if self.wire == Wire::Cdr {
+            self.at = self.at.next_multiple_of(N);
+        }
+        let mut number: [u8; N] = self.bytes(N)?.try_into().map_err(|_| BadMessage::Malformed)?;
+        if self.is_big {
+            number.reverse();
+        }
+        Ok(number)
+    }
+
+    pub fn u32(&mut self) -> Result<u32, BadMessage> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    pub fn f64(&mut self) -> Result<f64, BadMessage> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], BadMessage> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = self.f64()?;
+        }
+        Ok(numbers)
+    }
+
+    /// Passes over numbers.
+    pub fn skip_f64s(&mut self, count: usize) -> Result<(), BadMessage> {
+        (0..count).try_for_each(|_| self.f64().map(drop))
+    }
+
+    /// Count of a sequence each of whose entries takes at least `least_bytes`.
+    pub fn count(&mut self, least_bytes: usize) -> Result<usize, BadMessage> {
+        let count = usize::try_from(self.u32()?).map_err(|_| BadMessage::Malformed)?;
+        let is_there = count.checked_mul(least_bytes).is_some_and(|bytes| bytes <= self.left());
+        if is_there { Ok(count) } else { Err(BadMessage::Malformed) }
+    }
+
+    /// The name of a frame.
+    pub fn name(&mut self) -> Result<&'a str, BadMessage> {
+        let length = self.count(1)?;
+        let bytes = self.bytes(length)?;
+        let text = match (self.wire, bytes) {
+            (Wire::Ros1, text) => text,
+            (Wire::Cdr, [text @ .., 0]) => text,
+            (Wire::Cdr, []) => &[],
+            (Wire::Cdr, _) => return Err(BadMessage::Malformed),
+        };
+        let text = str::from_utf8(text).map_err(|_| BadMessage::Malformed)?;
+        if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text) } else { Err(BadMessage::Malformed) }
+    }
+
+    /// A `std_msgs/Header`. Of ROS 1 its frame may begin with a slash, which says nothing.
+    pub fn header(&mut self) -> Result<Header<'a>, BadMessage> {
+        if self.wire == Wire::Ros1 {
+            self.u32()?;
+        }
+        let [sec, nanosec] = [self.number()?, self.number()?];
+        let nanosec = i64::from(u32::from_le_bytes(nanosec));
+        let sec = match self.wire {
+            Wire::Cdr => i64::from(i32::from_le_bytes(sec)),
+            Wire::Ros1 => i64::from(u32::from_le_bytes(sec)),
+        };
+        let frame = self.name()?;
+        if nanosec >= NS_PER_S {
+            return Err(BadMessage::Stamp);
+        }
+        Ok(Header { stamp_ns: sec * NS_PER_S + nanosec, frame: frame.strip_prefix('/').unwrap_or(frame) })
+    }
+
+    /// Bytes that were not read.
+    pub fn left(&self) -> usize {
+        self.body.len().saturating_sub(self.at)
+    }
+
+    /// The message ends here.
+    pub fn end(&self) -> Result<(), BadMessage> {
+        let padding = if self.wire == Wire::Cdr { MAX_PADDING_BYTES } else { 0 };
+        if self.left() <= padding { Ok(()) } else { Err(BadMessage::Malformed) }
+    }
+}

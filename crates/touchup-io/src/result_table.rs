@@ -1,0 +1,267 @@
+//! Features and touches as a table of columns: CSV, or Parquet, which pandas, Polars, DuckDB and Ray read with its types.
+
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+use parquet::basic::{LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::Type;
+use serde_json::Value;
+
+use crate::atomic::write_atomically;
+use crate::csv_line::csv_line;
+use crate::features_file::FeatureRecord;
+use crate::file_error::FileError;
+use crate::touches_file::{self, TouchesFileError};
+
+/// Why a table was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum ResultTableError {
+    /// The system refused.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The touches cannot be read.
+    #[error(transparent)]
+    Touches(#[from] TouchesFileError),
+    /// Its columns do not make a file of Parquet.
+    #[error("the table does not fit Parquet: {0}")]
+    Parquet(#[from] ParquetError),
+}
+
+/// One value.
+#[derive(Clone, Debug, PartialEq)]
+enum Cell {
+    Number(f64),
+    Count(i64),
+    Flag(bool),
+    Text(String),
+}
+
+/// Columns of equal length; `None`: the row has no such value.
+#[derive(Debug, Default)]
+pub struct ResultTable {
+    columns: Vec<(String, Vec<Option<Cell>>)>,
+    rows: usize,
+}
+
+impl ResultTable {
+    /// A row for each feature; what is nested has its name behind that of what it is in, with `.` between, coordinates `_x`, `_y`, `_z`.
+    pub fn of_features(features: &[FeatureRecord]) -> Self {
+        let mut table = Self::default();
+        for feature in features {
+            // numbers and names alone cannot fail
+            let value = serde_json::to_value(feature).unwrap_or_default();
+            let mut cells = Vec::new();
+            flatten("", &value, &mut cells);
+            table.add_row(cells);
+        }
+        table
+    }
+
+    /// A row for each touch, with the columns of a file of touches.
+    ///
+    /// # Errors
+    /// [`ResultTableError::Touches`]
+    pub fn of_touches(path: &Path) -> Result<Self, ResultTableError> {
+        let mut table = Self::default();
+        for (number, touch) in touches_file::read_touches(path)?.iter().enumerate() {
+            let line = touches_file::line_of(touch, number);
+            let named = touches_file::HEADER.split(',').zip(line.split(','));
+            table.add_row(named.map(|(name, value)| (name.to_owned(), touch_cell(name, value))).collect());
+        }
+        Ok(table)
+    }
+
+    fn add_row(&mut self, cells: Vec<(String, Cell)>) {
+        for (name, cell) in cells {
+            let at = self.columns.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+                self.columns.push((name, Vec::new()));
+                self.columns.len() - 1
+            });
+            let column = &mut self.columns[at].1;
+            column.resize(self.rows, None);
+            column.push(Some(cell));
+        }
+        self.rows += 1;
+        self.columns.iter_mut().for_each(|(_, column)| column.resize(self.rows, None));
+    }
+
+    /// How many rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Writes it, as a whole or not at all: Parquet where the name ends so, else CSV.
+    ///
+    /// # Errors
+    /// [`ResultTableError`]
+    pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
+        let is_parquet = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
+        let bytes = if is_parquet { self.parquet()? } else { self.csv().into_bytes() };
+        let written = write_atomically(path, |out| out.write_all(&bytes));
+        Ok(written.map_err(|source| FileError::Write { path: path.to_owned(), source })?)
+    }
+
+    fn csv(&self) -> String {
+        let mut text = csv_line(self.columns.iter().map(|(name, _)| name.as_str())) + "\n";
+        for row in 0..self.rows {
+            let values: Vec<_> = self.columns.iter().map(|(_, column)| text_of(column[row].as_ref())).collect();
+            text += &csv_line(values.iter().map(String::as_str));
+            text.push('\n');
+        }
+        text
+    }
+
+    fn parquet(&self) -> Result<Vec<u8>, ParquetError> {
+        let field = |(name, column): &(String, Vec<Option<Cell>>)| {
+            let (physical, logical) = match kind_of(column) {
+                Kind::Number => (Physical::DOUBLE, None),
+                Kind::Count => (Physical::INT64, None),
+                Kind::Flag => (Physical::BOOLEAN, None),
+                Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            };
+            let field = Type::primitive_type_builder(name, physical).with_logical_type(logical);
+            field.with_repetition(Repetition::OPTIONAL).build().map(Arc::new)
+        };
+        let fields = self.columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
+        let schema = Arc::new(Type::group_type_builder("touchup").with_fields(fields).build()?);
+        let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(WriterProperties::builder().build()))?;
+        let mut group = writer.next_row_group()?;
+        for (_, column) in &self.columns {
+            write_column(&mut group, column)?;
+        }
+        group.close()?;
+        writer.into_inner()
+    }
+}
+
+/// The type of a column.
+enum Kind {
+    Number,
+    Count,
+    Flag,
+    Text,
+}
+
+/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text.
+fn kind_of(column: &[Option<Cell>]) -> Kind {
+    let is_all = |is: fn(&Cell) -> bool| column.iter().flatten().all(is);
+    if is_all(|cell| matches!(cell, Cell::Count(_))) {
+        Kind::Count
+    } else if is_all(|cell| matches!(cell, Cell::Count(_) | Cell::Number(_))) {
+        Kind::Number
+    } else if is_all(|cell| matches!(cell, Cell::Flag(_))) {
+        Kind::Flag
+    } else {
+        Kind::Text
+    }
+}
+
+fn write_column(
+    group: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
+    column: &[Option<Cell>],
+) -> Result<(), ParquetError> {
+    match kind_of(column) {
+        Kind::Number => write_values::<DoubleType>(group, column, |cell| match cell {
+            Cell::Number(number) => *number,
+            Cell::Count(count) => *count as f64,
+            Cell::Flag(_) | Cell::Text(_) => f64::NAN,
+        }),
+        Kind::Count => {
+            write_values::<Int64Type>(group, column, |cell| if let Cell::Count(count) = cell { *count } else { 0 })
+        }
+        Kind::Flag => write_values::<BoolType>(group, column, |cell| matches!(cell, Cell::Flag(true))),
+        Kind::Text => {
+            write_values::<ByteArrayType>(group, column, |cell| ByteArray::from(text_of(Some(cell)).into_bytes()))
+        }
+    }
+}
+
+fn write_values<T: DataType>(
+    group: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
+    column: &[Option<Cell>],
+    value: impl Fn(&Cell) -> T::T,
+) -> Result<(), ParquetError> {
+    let values: Vec<T::T> = column.iter().flatten().map(value).collect();
+    // an optional value is there at level 1
+    let levels: Vec<i16> = column.iter().map(|cell| i16::from(cell.is_some())).collect();
+    if let Some(mut writer) = group.next_column()? {
+        writer.typed::<T>().write_batch(&values, Some(&levels), None)?;
+        writer.close()?;
+    }
+    Ok(())
+}
+
+fn text_of(cell: Option<&Cell>) -> String {
+    match cell {
+        None => String::new(),
+        Some(Cell::Number(number)) => number.to_string(),
+        Some(Cell::Count(count)) => count.to_string(),
+        Some(Cell::Flag(flag)) => flag.to_string(),
+        Some(Cell::Text(text)) => text.clone(),
+    }
+}
+
+fn touch_cell(name: &str, value: &str) -> Cell {
+    let count = || value.parse().map(Cell::Count).ok();
+    let number = || value.parse().map(Cell::Number).ok();
+    let cell = match name {
+        "rejected" => Some(Cell::Flag(value == "1")),
+        "touch" | "stamp_ns" | "stroke" => count(),
+        _ => number(),
+    };
+    cell.unwrap_or_else(|| Cell::Text(value.to_owned()))
+}
+
+/// Adds the values that are in `value` by their names.
+fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
+    let mut add = |cell| cells.push((name.to_owned(), cell));
+    match value {
+        Value::Null => {}
+        Value::Bool(flag) => add(Cell::Flag(*flag)),
+        Value::String(text) => add(Cell::Text(text.clone())),
+        Value::Number(number) => match number.as_i64() {
+            Some(count) => add(Cell::Count(count)),
+            None => add(Cell::Number(number.as_f64().unwrap_or(f64::NAN))),
+        },
+        Value::Array(values) if values.len() == 3 && values.iter().all(Value::is_number) => {
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(values) {
+                flatten(&format!("{name}_{axis}"), value, cells);
+            }
+        }
+        // what has a length of its own is kept as JSON
+        Value::Array(_) => add(Cell::Text(value.to_string())),
+        Value::Object(values) => {
+            for (key, value) in values {
+                let inner = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+                flatten(&inner, value, cells);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_nested_has_its_name_and_what_is_missing_is_empty() {
+        let mut table = ResultTable::default();
+        for json in
+            [r#"{"id":1,"center_mm":[1,2.5,3],"size":{"diameter_mm":5.5}}"#, r#"{"id":2,"kind":"a, b","ids":[1,2]}"#]
+        {
+            let mut cells = Vec::new();
+            flatten("", &serde_json::from_str(json).unwrap(), &mut cells);
+            cells.sort_by(|a, b| a.0.cmp(&b.0));
+            table.add_row(cells);
+        }
+        let expected = "center_mm_x,center_mm_y,center_mm_z,id,size.diameter_mm,ids,kind\n1,2.5,3,1,5.5,,\n,,,2,,\"[1,2]\",\"a, b\"\n";
+        assert_eq!(table.csv(), expected);
+        let parquet = table.parquet().unwrap();
+        assert!(parquet.starts_with(b"PAR1") && parquet.ends_with(b"PAR1"));
+    }
+}

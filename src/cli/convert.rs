@@ -1,0 +1,105 @@
+//! `touchup convert`: poses and wrenches of any recording, as a recording that every verb reads without flags; features and touches as
+//! tables.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::progress::WorkProgress;
+use super::recorded::RecordedFlags;
+use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
+use crate::io::features_file::read_features;
+use crate::io::recording::{CopiedRecording, RecordingReader, StampSource, Topics, copy_recording};
+use crate::io::result_table::ResultTable;
+use crate::scene::Scene;
+
+#[derive(Debug, Args)]
+pub(super) struct ConvertArguments {
+    /// A recording: MCAP or SQLite of ROS 2, a file or a folder, a bag of ROS 1, or a table (CSV, log of a UR's RTDE); or features.json or
+    /// touches.csv of touchup
+    #[arg(value_name = "INPUT")]
+    input: PathBuf,
+    /// Output: .mcap of a recording, with /stylus/pose and /stylus/wrench; .csv or .parquet of features or touches
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Names the columns of a table
+    #[arg(long, value_name = "YAML")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: RecordedFlags,
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    #[arg(long, value_name = "S", default_value = "header")]
+    stamp: StampSource,
+    /// Prints the counts as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Converted {
+    /// poses, or frames of markers
+    poses: u64,
+    wrenches: u64,
+    pose_frame: String,
+    wrench_frame: String,
+    out: PathBuf,
+}
+
+impl fmt::Display for Converted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let frame =
+            |name: &str| if name.is_empty() { "a frame without a name".to_owned() } else { format!("{name:?}") };
+        let (poses, wrenches) = (counted(self.poses, "pose", "poses"), counted(self.wrenches, "wrench", "wrenches"));
+        let [pose_frame, wrench_frame] = [&self.pose_frame, &self.wrench_frame].map(|name| frame(name));
+        write!(f, "{poses} in {pose_frame}, {wrenches} in {wrench_frame}\nwrote {}", self.out.display())
+    }
+}
+
+/// The command: reads, writes and counts.
+pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> {
+    let ConvertArguments { input, out, scene, recorded, stamp, json } = arguments;
+    check_kept("INPUT", input, out)?;
+    let ending = out.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
+    if ending == "csv" || ending == "parquet" {
+        check_place(out)?;
+        return convert_results(input, out, *json);
+    }
+    check_outputs(&[("--out", ".mcap", &Some(out.clone()))], &[Some(input)], "read: choose another place")?;
+    let scene = scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+    let layout = recorded.layout(&scene);
+    let topics = Topics { markers: layout.topics.markers.clone(), ..Topics::default() };
+    let mut reader = RecordingReader::open(input, layout)?.stamped_by(*stamp);
+    let mut progress = WorkProgress::new("convert", reader.message_count());
+    let copied = copy_recording(&mut reader, out, &topics, &mut || progress.step())?;
+    let CopiedRecording { poses, wrenches, pose_frame, wrench_frame, damage } = copied;
+    let converted = Converted { poses, wrenches, pose_frame, wrench_frame, out: out.clone() };
+    print_report(*json, &converted, || converted.to_string())?;
+    let mut losses: Losses = damage.iter().map(ToString::to_string).collect();
+    losses.extend(reader.losses());
+    Ok(losses)
+}
+
+/// What `--json` prints of a table.
+#[derive(Debug, Serialize)]
+struct ConvertedTable {
+    rows: usize,
+    out: PathBuf,
+}
+
+/// Features where the input is JSON, else touches.
+fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliError> {
+    let are_features = input.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let table = match are_features {
+        true => ResultTable::of_features(&read_features(input)?.features),
+        false => ResultTable::of_touches(input)?,
+    };
+    table.write(out)?;
+    let converted = ConvertedTable { rows: table.rows(), out: out.to_owned() };
+    print_report(json, &converted, || {
+        format!("{}\nwrote {}", counted(converted.rows as u64, "row", "rows"), out.display())
+    })?;
+    Ok(Losses::new())
+}

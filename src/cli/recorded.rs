@@ -1,0 +1,52 @@
+//! Where in a recording the poses and wrenches are, as flags name it: the same for every verb that reads one.
+
+use clap::Args;
+
+use crate::io::recording::{RecordingLayout, Topics, TransformFrames};
+use crate::scene::Scene;
+
+/// Topic of the transforms, where no other is named.
+const TRANSFORMS: &str = "/tf";
+
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct RecordedFlags {
+    /// geometry_msgs/WrenchStamped or another wrench: of the part on the stylus [default: /stylus/wrench]
+    #[arg(long, value_name = "TOPIC")]
+    wrench_topic: Option<String>,
+    /// geometry_msgs/PoseStamped or another pose: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space
+    /// in the scene say [default: /stylus/pose, with --pose-frame /tf]
+    #[arg(long, value_name = "TOPIC")]
+    pose_topic: Option<String>,
+    /// The pose of this frame is taken from the transforms on --pose-topic and its _static, as that of tool0
+    #[arg(long, value_name = "FRAME")]
+    pose_frame: Option<String>,
+    /// With --pose-frame: the frame in which the pose is wanted [default: the root of the tree]
+    #[arg(long, value_name = "FRAME", requires = "pose_frame")]
+    base_frame: Option<String>,
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
+    #[arg(long, value_name = "TOPIC", conflicts_with_all = ["pose_topic", "pose_frame"])]
+    pub markers_topic: Option<String>,
+}
+
+impl From<Topics> for RecordedFlags {
+    fn from(topics: Topics) -> Self {
+        let Topics { pose, wrench, markers } = topics;
+        Self { wrench_topic: Some(wrench), pose_topic: Some(pose), markers_topic: markers, ..Self::default() }
+    }
+}
+
+impl RecordedFlags {
+    /// What they name, and the scene of the columns of a table.
+    pub fn layout(&self, scene: &Scene) -> RecordingLayout {
+        let own = Topics::default();
+        let pose_frame = self.pose_frame.as_ref();
+        let pose = if pose_frame.is_some() { TRANSFORMS.to_owned() } else { own.pose };
+        let topics = Topics {
+            pose: self.pose_topic.clone().unwrap_or(pose),
+            wrench: self.wrench_topic.clone().unwrap_or(own.wrench),
+            markers: self.markers_topic.clone(),
+        };
+        let frames = pose_frame.map(|moving| TransformFrames { moving: moving.clone(), base: self.base_frame.clone() });
+        RecordingLayout { topics, frames, columns: scene.table_columns() }
+    }
+}
