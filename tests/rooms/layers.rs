@@ -273,7 +273,8 @@ impl<'a> Place<'a> {
 }
 
 /// Crates that are one room each, and its name.
-const WHOLE: &[(&str, &str)] = &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report"), ("touchup-python", "python")];
+const WHOLE: &[(&str, &str)] =
+    &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report"), ("touchup-python", "python")];
 
 /// Crates with several rooms, as other crates name them.
 const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::CliError;
@@ -70,7 +71,6 @@ pub fn set_columns(
     sigma: Option<&[f64]>,
     support: Option<&[u8]>,
 ) -> PyResult<()> {
-    use numpy::PyArray1;
     let py = into.py();
     let sigma = sigma.and_then(|of_slots| compact.column(of_slots)).map(|of| PyArray1::from_vec(py, of));
     let support = support.and_then(|of_slots| compact.column(of_slots)).map(|of| PyArray1::from_vec(py, of));
@@ -80,14 +80,16 @@ pub fn set_columns(
 
 /// Writes a mesh as PLY, STL or OBJ; PLY also has `sigma_mm` and `support`.
 #[pyfunction]
+#[pyo3(signature = (path, unit, mesh, sigma, support))]
 pub fn write_mesh(
     py: Python<'_>,
     path: PathBuf,
     unit: &str,
     mesh: MeshArrays<'_>,
-    sigma: Option<Vec<f64>>,
-    support: Option<Vec<u8>>,
+    sigma: Option<PyReadonlyArray1<'_, f64>>,
+    support: Option<PyReadonlyArray1<'_, u8>>,
 ) -> PyResult<()> {
+    let (sigma, support) = (sigma.map(|of| of.as_array().to_vec()), support.map(|of| of.as_array().to_vec()));
     let mesh = mesh_of(&mesh, "the mesh").map_err(|error| exception(py, error))?;
     at_work(py, || {
         let mut columns = Vec::new();

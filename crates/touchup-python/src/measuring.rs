@@ -28,6 +28,7 @@ const POINTS_EACH: f64 = 20_000.0;
 
 /// Holes, slots, pockets, bosses, edges, corners and planes of a mesh, as JSON.
 #[pyfunction]
+#[pyo3(signature = (mesh, touches))]
 pub fn features(py: Python<'_>, mesh: MeshArrays<'_>, touches: Option<&Bound<'_, PyDict>>) -> PyResult<String> {
     let mesh = mesh_of(&mesh, "the mesh").map_err(|error| exception(py, error))?;
     let touches = touches.map(touches_of).transpose()?.transpose().map_err(|error| exception(py, error))?;
@@ -52,6 +53,7 @@ impl Indexed {
 
 /// How far a mesh is from the true part: `report` as JSON in mm, and `deviation` (V,) of each vertex, m, + outside.
 #[pyfunction]
+#[pyo3(signature = (mesh, support, truth, samples, seed, range_mm, tolerance_mm))]
 #[expect(clippy::too_many_arguments, reason = "what the package passes on")]
 pub fn compare<'py>(
     py: Python<'py>,
@@ -104,6 +106,7 @@ fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
 
 /// The rigid motion that brings `source` onto `target`: by point to plane from about the right place, or by features from anywhere.
 #[pyfunction]
+#[pyo3(signature = (source, target, method, alternative, seed))]
 pub fn align<'py>(
     py: Python<'py>,
     source: MeshArrays<'_>,
@@ -152,9 +155,11 @@ fn by_features(
     let surfaces = Surfaces { points: &points, target: &target.mesh, tree: &target.tree };
     let found = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
         Ok(only) => vec![only],
-        Err(
-            FeaturesError::Ambiguous { alternatives } | FeaturesError::FreeTurn { alternatives, .. },
-        ) if alternative.is_some() => alternatives,
+        Err(FeaturesError::Ambiguous { alternatives } | FeaturesError::FreeTurn { alternatives, .. })
+            if alternative.is_some() =>
+        {
+            alternatives
+        }
         Err(error) => return Err(error.into()),
     };
     let number = alternative.unwrap_or(1);

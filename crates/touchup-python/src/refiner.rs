@@ -203,6 +203,7 @@ fn samples_of(arrays: &SampleArrays<'_>) -> Result<Vec<Sample>, CliError> {
 #[pymethods]
 impl Refiner {
     #[new]
+    #[pyo3(signature = (scene_text, scene_path, scan, scan_file, frame))]
     fn new(
         py: Python<'_>,
         scene_text: Option<String>,
@@ -211,8 +212,7 @@ impl Refiner {
         scan_file: Option<(std::path::PathBuf, String)>,
         frame: &str,
     ) -> PyResult<Self> {
-        let read =
-            || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
+        let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
         let refinement = at_work(py, || Refinement::new(scan, &scene, frame))?;
         Ok(Self { refinement: Mutex::new(Some(refinement)) })

@@ -80,6 +80,7 @@ pub fn default_scene(py: Python<'_>) -> PyResult<String> {
 
 /// Refuses a scene that cannot be.
 #[pyfunction]
+#[pyo3(signature = (text, path))]
 pub fn check_scene(py: Python<'_>, text: Option<String>, path: Option<PathBuf>) -> PyResult<()> {
     at_work(py, || source(text, path)?.read().map(drop))
 }

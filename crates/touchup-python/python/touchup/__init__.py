@@ -7,6 +7,7 @@ A wrench is what the part does to the stylus.
 """
 
 from ._touchup import TouchupError, TouchupWarning, Update
+from ._scene_keys import Scene
 from .align import Alignment, align, align_pairs
 from .compare import Comparison, compare
 from .features import features
@@ -14,7 +15,7 @@ from .mesh import GUESSED, SCAN, TOUCHED, UNREACHABLE, Mesh, MeshLike
 from .recording import Recording, Samples
 from .refine import Refined, refine
 from .refiner import Event, Pushed, Refiner
-from .scene import Scene, check_scene, default_scene
+from .scene import check_scene, default_scene
 from .simulate import Simulated, simulate
 from .touches import Touches
 
