@@ -47,8 +47,12 @@ def described(key: dict) -> str:
     if key["range"]:
         low, high = key["range"]
         numbers += f" {low:g} to {high:g}"
-    default = "" if key["is_section"] or key["default"] is None else f"; default {json.dumps(key['default'])}"
+    default = "" if key["is_section"] or key["default"] is None else f"; default `{plain(key['default'])}`"
     return f"{key['summary']}{' —' + numbers if numbers else ''}{default}"
+
+
+def plain(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def class_of(name: str, summary: str, keys: list[dict]) -> str:

@@ -82,18 +82,36 @@ pub struct RefinedScan {
     pub summary: Map<String, Value>,
 }
 
+/// Scene and scan, before it is known in which axes wrenches come.
+struct ReadScan {
+    scene: Scene,
+    scan: TriMesh,
+    cut: RegionCut,
+}
+
+impl ReadScan {
+    fn new(scan: ScanSource, scene: &SceneSource) -> Result<Self, CliError> {
+        let scene = scene.read()?;
+        let CutScan { mesh, cut } = scene.cut(scan.read()?)?;
+        Ok(Self { scene, scan: mesh, cut })
+    }
+
+    fn refinement(self, frame: WrenchFrame) -> Result<Refinement, CliError> {
+        let Self { scene, scan, cut } = self;
+        let params = scene.refine_params(frame).ok_or_else(|| usage(NOTHING_MOVES.to_owned()))?;
+        let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
+        let engine = Engine::new(scan.clone(), cut.refine_params(params), patch, Renewal::AtEnd)?;
+        Ok(Refinement { engine, scene, scan, cut })
+    }
+}
+
 impl Refinement {
     /// Reads scene and scan.
     ///
     /// # Errors
     /// As `touchup refine`.
     pub fn new(scan: ScanSource, scene: &SceneSource, frame: WrenchFrame) -> Result<Self, CliError> {
-        let scene = scene.read()?;
-        let CutScan { mesh, cut } = scene.cut(scan.read()?)?;
-        let params = scene.refine_params(frame).ok_or_else(|| usage(NOTHING_MOVES.to_owned()))?;
-        let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
-        let scan = mesh.clone();
-        Ok(Self { engine: Engine::new(mesh, cut.refine_params(params), patch, Renewal::AtEnd)?, scene, scan, cut })
+        ReadScan::new(scan, scene)?.refinement(frame)
     }
 
     /// Reconstructs what was touched.
@@ -202,16 +220,20 @@ impl Touching {
 }
 
 /// Refines, and judges the recording as `touchup refine` does; returns what came of it and what was lost.
+///
+/// - `touching`: opens what was recorded, once scene and scan were read.
 fn replayed(
     scan: ScanSource,
     scene: &SceneSource,
-    touching: Touching,
+    touching: impl FnOnce() -> Result<Touching, CliError>,
     force: bool,
 ) -> Result<(RefinedScan, Vec<String>), CliError> {
     let scan_name = if let ScanSource::File(path, _) = &scan { path.clone() } else { shown(None, "the scan") };
+    let read = ReadScan::new(scan, scene)?;
+    let touching = touching()?;
     let recording_name = touching.path().unwrap_or_else(|| shown(None, "the recording"));
     let frame = touching.frame();
-    let mut refinement = Refinement::new(scan, scene, frame)?;
+    let mut refinement = read.refinement(frame)?;
     let scene = refinement.scene.clone();
     // an update that takes every sample for contact says nothing about contact
     let observer = scene.refine_params(frame).and_then(|params| params.contact().completed());
@@ -293,13 +315,13 @@ pub fn refine<'py>(
     };
     let (scan, scene, all) = read().map_err(|error| exception(py, error))?;
     let (refined, losses) = at_work(py, || {
-        let touching = match (all, recording_file) {
-            (Some((all, frame)), None) => Touching::Messages { all, frame },
+        let touching = || match (all, recording_file) {
+            (Some((all, frame)), None) => Ok(Touching::Messages { all, frame }),
             (None, Some((path, pose, wrench, markers, stamp))) => {
                 let topics = topics(pose, wrench, markers.clone());
-                Touching::File { recording: Recording::open(&path, &topics, stamps_of(&stamp)?)?, path, markers }
+                Ok(Touching::File { recording: Recording::open(&path, &topics, stamps_of(&stamp)?)?, path, markers })
             }
-            _ => return Err(usage("a recording is a Recording of arrays, or the path of a file".to_owned())),
+            _ => Err(usage("a recording is a Recording of arrays, or the path of a file".to_owned())),
         };
         replayed(scan, &scene, touching, force)
     })?;

@@ -75,12 +75,13 @@ def test_types_are_right_in_the_eyes_of_mypy(tmp_path):
         "scene: touchup.Scene = {'tip': {'radius_mm': 1.5}, 'patch': False}\n"
         "refined = touchup.refine('scan.ply', 'touch.mcap', scene)\n"
         "diameter: float = refined.features['features'][0]['diameter_mm']\n"
-        "first: touchup.Event = next(touchup.Refiner(refined.mesh, scene).events(touchup.Samples(*[refined.touches.stamp_ns] * 3)))\n",
+        "samples = touchup.Samples(refined.touches.stamp_ns, refined.touches.centre, refined.touches.normal)\n"
+        "first: touchup.Event = next(touchup.Refiner(refined.mesh, scene).events(samples))\n"
+        "update: touchup.Update = touchup.Refiner(refined.mesh, scene).push(0, (0, 0, 0), (0, 0, 0, 1), [0, 0, 1])\n",
         encoding="utf-8",
     )
-    package = Path(touchup.__file__).parent
-    for target in (use, package):
-        ended = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(target)], capture_output=True, text=True, cwd=tmp_path)
+    for target in ([str(use)], ["-p", "touchup"]):
+        ended = subprocess.run([sys.executable, "-m", "mypy", "--strict", *target], capture_output=True, text=True, cwd=tmp_path)
         assert ended.returncode == 0, ended.stdout
     use.write_text("import touchup\nscene: touchup.Scene = {'tip': {'raduis_mm': 1.5}}\n", encoding="utf-8")
     ended = subprocess.run([sys.executable, "-m", "mypy", "--strict", str(use)], capture_output=True, text=True, cwd=tmp_path)

@@ -8,6 +8,29 @@ from typing_extensions import Self
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "run_command",
+    "TouchupError",
+    "TouchupWarning",
+    "read_mesh",
+    "read_recording",
+    "read_touches",
+    "write_mesh",
+    "write_recording",
+    "write_touches",
+    "align",
+    "align_pairs",
+    "compare",
+    "features",
+    "Refiner",
+    "Update",
+    "refine",
+    "check_scene",
+    "default_scene",
+    "scene_parameters",
+    "simulate",
+]
+
 _Floats = NDArray[np.float64]
 _Mesh = tuple[_Floats, NDArray[np.uint32]]
 _Poses = tuple[NDArray[np.int64], _Floats, _Floats]

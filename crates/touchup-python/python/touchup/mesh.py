@@ -82,10 +82,11 @@ class Mesh:
             return mesh
         if isinstance(mesh, tuple):
             vertices, faces = mesh
+        elif isinstance(mesh, HasFaces):
+            # first: the triangles of trimesh are corners as points
+            vertices, faces = mesh.vertices, mesh.faces
         elif isinstance(mesh, HasTriangles):
             vertices, faces = mesh.vertices, mesh.triangles
-        elif isinstance(mesh, HasFaces):
-            vertices, faces = mesh.vertices, mesh.faces
         else:
             raise error(f"a mesh has vertices and faces, or triangles; a {type(mesh).__name__} has not")
         if unit not in METRES:
