@@ -10,14 +10,14 @@
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
-is_full=
+is_full= ignored_too=()
 requirements=tests/python/requirements.txt
 case "${1-}" in
   # property tests try the same cases in every run, here; others with --full
   "") export PROPTEST_RNG_SEED=1 ;;
   --full)
-    is_full=yes requirements=tests/python/requirements-full.txt
-    export TOUCHUP_FULL=1 PROPTEST_CASES=2560
+    is_full=yes ignored_too=(--include-ignored) requirements=tests/python/requirements-full.txt
+    export TOUCHUP_FULL=1 PROPTEST_CASES=2560 PROPTEST_MAX_GLOBAL_REJECTS=10240
     ;;
   *) echo "usage: tests/all.sh [--full]" >&2; exit 2 ;;
 esac
@@ -26,7 +26,7 @@ target=${CARGO_TARGET_DIR:-target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
 logs=$target/test-logs
 venv=$target/python
-passed=0 failed=0 skipped=0
+passed=0 failed=0 skipped=0 left=0
 reasons=() stages=()
 features=() has_ur=
 rm -rf "$logs" && mkdir -p "$logs/results" || exit 1
@@ -67,9 +67,9 @@ PYTHON
 # the operator's page is built by npm; the tests drive it in a browser
 web_feature() { command -v npm > /dev/null && features+=(--features web); }
 
-# lines of passing tests, and what they print, go into the log alone
+# lines of passing tests, and of those that are left to --full, and what they print, go into the log alone
 without_passing() {
-  sed -u -e '/^successes:$/,/^\(failures:$\|test result: \)/{/^\(failures:$\|test result: \)/!d}' -e '/^test .* \.\.\. ok$/d' -e '/^$/d'
+  sed -u -e '/^successes:$/,/^\(failures:$\|test result: \)/{/^\(failures:$\|test result: \)/!d}' -e '/^test .* \.\.\. \(ok\|ignored, full\)$/d' -e '/^$/d'
 }
 
 # the names of the failed tests in a log of cargo test, each with its program; a program that ended before it counted has no test
@@ -94,14 +94,17 @@ build_tests() {
 
 # cargo_tests LOG ARGUMENT...
 cargo_tests() {
-  local log=$1 status passed_here ignored line; shift
-  cargo test --no-fail-fast "$@" -- --show-output 2>&1 | tee "$log" | without_passing
+  local log=$1 status passed_here ignored left_here line; shift
+  cargo test --no-fail-fast "$@" -- --show-output "${ignored_too[@]}" 2>&1 | tee "$log" | without_passing
   status=${PIPESTATUS[0]}
   read -r passed_here ignored <<<"$(awk '/^test result: / { p += $4; i += $8 } END { print p + 0, i + 0 }' "$log")"
   # a test that could not run says so, once or oftener, and passes: it counts as what it is
   sed -n 's/^SKIPPED: //p' "$log" | awk -F': ' '!seen[$1]++' > "$log.skipped"
   passed=$((passed + passed_here - $(wc -l < "$log.skipped")))
   while read -r line; do skip 1 "$line"; done < "$log.skipped"
+  # what is ignored for its slowness belongs to --full
+  left_here=$(grep -c '^test .* \.\.\. ignored, full$' "$log")
+  left=$((left + left_here)) ignored=$((ignored - left_here))
   [ "$ignored" -eq 0 ] || skip "$ignored" "ignored Rust tests"
   [ "$status" -ne 0 ] || return
   failed_tests "$log" > "$log.failed"
@@ -180,6 +183,7 @@ fi
 echo
 printf '%s\n' "${stages[@]}"
 [ "${#reasons[@]}" -eq 0 ] || printf '%s\n' "${reasons[@]}"
+[ "$left" -eq 0 ] || echo "$left Rust tests and what is marked full in tests/python belong to --full"
 count="$passed passed, $failed failed, $skipped skipped"
 [ -z "$is_full" ] || tests/results.sh "$logs/rust.log" "$logs/results" "$count" > docs/results.md || fail "docs/results.md could not be written"
 echo "$passed passed, $failed failed, $skipped skipped"

@@ -22,6 +22,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 # support of a vertex that rests on a touch
 TOUCHED = 1
+# of the demo's touches are in the session, twice
+HALF_NS = 23 * 10**9
 # setpriority: steps behind the node
 STEPS_BEHIND = 5
 
@@ -67,6 +69,12 @@ def touched_places(page):
     return [page.vertices[vertex] for vertex, support in page.support.items() if support == TOUCHED and vertex in page.vertices]
 
 
+def vertices_on(page, points):
+    """How many vertices that rest on touches are within half a millimetre of points."""
+    distances, _ = cKDTree(numpy.array([[point[axis] for axis in "xyz"] for point in points])).query(numpy.array(touched_places(page)))
+    return int((distances < 0.5e-3).sum())
+
+
 def sampled_ns(page):
     """Stamp of the newest sample; None before the first."""
     mismatch = page.newest.get("mismatch")
@@ -82,15 +90,15 @@ def rest(page, for_s=2):
             version, since = page.version, time.monotonic()
 
 
-def late_touch(page, after_ns):
-    """A touch that began after a time, by the vertices that rest on it."""
+def touch_that(page, begins_right):
+    """A touch whose beginning (ns) is as wanted, by the vertices that rest on it."""
     places = touched_places(page)
     for at in numpy.random.default_rng(5).permutation(len(places))[:200]:
         point = {"header": {"frame_id": "object"}, "point": dict(zip("xyz", places[at], strict=True))}
         found = page.call("~/take_out_touch", point=point, preview=True)["response"]
-        if found["success"] and ns(found["touch"]) > after_ns and found["contacts"] > 20:
+        if found["success"] and begins_right(ns(found["touch"])) and found["contacts"] > 20:
             return found["touch"]
-    raise AssertionError("no touch is as late")
+    raise AssertionError("no touch begins then")
 
 
 def take_until(pages, condition):
@@ -111,19 +119,19 @@ def played(touchup_bin, recording, domain, page):
 
 
 def halved(recording, folder):
-    """A recording in two halves: a touch that begins between two changes of strokes would take away what can be redone."""
+    """The first 46 s of a recording in two halves: a touch that begins between two changes of strokes would take away what can be redone."""
     times = []
     copy_part(recording, folder / "none.mcap", lambda _, stamp_ns: times.append(stamp_ns))
-    middle = (min(times) + max(times)) // 2
+    middle, end = min(times) + HALF_NS, min(times) + 2 * HALF_NS
     copy_part(recording, folder / "first.mcap", lambda _, stamp_ns: stamp_ns < middle)
-    copy_part(recording, folder / "second.mcap", lambda _, stamp_ns: stamp_ns >= middle)
+    copy_part(recording, folder / "second.mcap", lambda _, stamp_ns: middle <= stamp_ns < end)
     return folder / "first.mcap", folder / "second.mcap"
 
 
 @pytest.fixture(scope="module")
 def recorded(touchup_bin, demo_folder, tmp_path_factory):
-    """A session that is over: strokes were undone and redone while it was touched, one was taken out, and one undone in the end. Its folder,
-    and the triangles that a page had of it at rest."""
+    """A session that is over: strokes were undone and redone while it was touched, and one taken out; in the end another one was taken out, and
+    one undone. Its folder, the triangles that a page had of it at rest, and contacts of the touch that was taken out last."""
     folder = tmp_path_factory.mktemp("recorded")
     halves = halved(demo_folder / "touch.mcap", folder)
     with PageNode(touchup_bin, folder, demo_folder / "scan.ply") as node, Socket(node.url) as page:
@@ -131,23 +139,34 @@ def recorded(touchup_bin, demo_folder, tmp_path_factory):
         assert page.call("~/undo", strokes=2)["response"]["strokes"] == 2
         assert page.call("~/redo", strokes=1)["response"]["strokes"] == 1
         changed_ns = sampled_ns(page)
-        played(touchup_bin, halves[1], node.domain, page)
 
         def saved():
             return page.call("~/save_mesh", overwrite=True)["response"]["mesh_version"]
 
-        page.take_until(saved)
-        out = page.call("~/take_out_touch", touch=late_touch(page, changed_ns + 10**9))["response"]
-        assert out["success"], out
+        def at_rest():
+            page.take_until(saved)
+            version = saved()
+            page.take_until(lambda: page.version >= version)
+
+        def take_out(begins_right):
+            at_rest()
+            out = page.call("~/take_out_touch", touch=touch_that(page, begins_right))["response"]
+            assert out["success"], out
+            return out["points"]
+
+        # long before the strokes that were undone
+        take_out(lambda begun_ns: begun_ns < changed_ns - 15 * 10**9)
+        played(touchup_bin, halves[1], node.domain, page)
+        at_rest()
+        points = take_out(lambda begun_ns: changed_ns + 10**9 < begun_ns < sampled_ns(page) - 5 * 10**9)
+        at_rest()
         assert page.call("~/undo", strokes=1)["response"]["strokes"] == 1
-        page.take_until(saved)
-        version = saved()
-        page.take_until(lambda: page.version >= version)
+        at_rest()
         seen = triangles(page)
         assert node.end() in (0, 4), node.text()
     changes = [json.loads(line)["change"] for line in (node.session / "strokes.jsonl").read_text().splitlines()]
-    assert changes == ["undo", "undo", "redo", "take_out", "undo"]
-    return node.session, seen
+    assert changes == ["undo", "undo", "redo", "take_out", "take_out", "undo"]
+    return node.session, seen, points
 
 
 def with_session(node, recorded, *names):
@@ -181,16 +200,23 @@ def files_of(folder):
 
 
 def test_a_replay_ends_bit_by_bit_with_the_mesh_of_the_session_and_leaves_it_as_it_was(node, recorded):
-    session, seen = recorded
+    session, seen, points = recorded
     before = files_of(node.session.parent / "one")
     with ReplaySocket(node, "one") as page:
         page.ready()
         assert page.newest["state"]["session"] == "one" and page.newest["state"]["role"] == "look"
-        assert page.state["left_out"] == 1 and page.state["damage"] is None
-        # the demo is 74 s of touches
-        assert 60 < page.state["end_s"] < 80
+        assert page.state["damage"] is None
+        # with a rest of 2 s between the halves
+        assert 45 < page.state["end_s"] < 50
+        # a touch that was taken out in the end is there until then
+        page.set(is_paused=True, at_s=page.state["end_s"] - 1)
+        page.take_until(lambda: page.state["target_s"] is None and page.state["at_s"] > 30)
+        rest(page)
+        there = vertices_on(page, points)
+        page.set(is_paused=False)
         page.run_to_the_end()
         page.take_until(lambda: len(page.faces) == len(seen) and triangles(page) == seen)
+        assert there > 20 and vertices_on(page, points) < there / 2
         assert page.newest["features"]["features"] and page.newest["tip"]["markers"] and page.newest["mismatch"]
         assert page.counts.get("diagnostics") is None and page.newest["annotations"]["features"] == {}
         # and so it is in the file
@@ -204,13 +230,12 @@ def test_a_replay_ends_bit_by_bit_with_the_mesh_of_the_session_and_leaves_it_as_
 
 
 def test_what_was_undone_in_the_session_makes_the_difference(node, recorded):
-    _, seen = recorded
+    seen = recorded[1]
     folder = node.session.parent / "redone"
     shutil.copytree(recorded[0], folder)
     (folder / "strokes.jsonl").unlink()
     with ReplaySocket(node, "redone") as page:
-        assert page.ready().state["left_out"] == 0
-        page.run_to_the_end()
+        page.ready().run_to_the_end()
         rest(page)
         assert triangles(page) != seen
 
@@ -332,7 +357,6 @@ def test_the_page_says_that_it_is_a_replay_and_offers_nothing_else(browser, touc
         page.get_by_text("Replay of one").wait_for()
         wait_until(page, "window.touchup !== undefined && touchup.session() === 'one#1' && touchup.tip() !== null")
         assert page.get_by_text("Nothing here acts on the session that runs, or on an arm.").is_visible()
-        assert page.get_by_text("Touches that were taken out do not come: 1.").is_visible()
         for name in ["Undo", "Redo", "Detect", "Save", "New session", "Report", "Hold to run", "Another device", "Approve the plan"]:
             assert page.get_by_role("button", name=name).count() == 0 or page.get_by_role("button", name=name).is_hidden(), name
         page.get_by_role("button", name="4 times").click()
@@ -350,7 +374,7 @@ def test_the_page_says_that_it_is_a_replay_and_offers_nothing_else(browser, touc
         page.screenshot(path=tmp_path / "ahead.png")
         page.get_by_text("Touched again from the scan on").wait_for(state="hidden")
         wait_until(page, "touchup.session() === 'one#2'")
-        assert page.locator("output.replay-time").inner_text().startswith("0:08 / 1:")
+        assert page.locator("output.replay-time").inner_text().startswith("0:08 / 0:4")
         assert page.evaluate("touchup.camera().view") == camera
         # a tap on the part offers nothing
         page.locator("canvas").first.click()

@@ -11,6 +11,7 @@ use touchup::reconstruct::{PatchDelta, Patcher, PatcherParams, Splice};
 use touchup::sim::StylusParams;
 use touchup::stylus::{BiasParams, ContactSample, ProbedPoint, Sample};
 
+use crate::full::either;
 use crate::plate_stream::{PlateStream, contacts_of, plate_stream};
 use crate::soundness::{intersections, rim_length, soundness};
 
@@ -143,7 +144,7 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
 /// between, and at rest it is what is saved.
 #[test]
 fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
-    let stream = stream(4, 0.2);
+    let stream = stream(4, either(0.12, 0.2));
     let (scan, tree, contacts) = (&stream.scan, FaceTree::new(&stream.scan), contacts(&stream));
     let (mut settles, mut never) = (patcher(&stream), patcher(&stream));
     let follower = || (scan.clone(), FaceTree::new(scan), Splice::default());
@@ -239,7 +240,7 @@ fn assert_same(a: &TriMesh, b: &TriMesh) {
 
 #[test]
 fn two_threads_do_what_one_does_and_leave_the_scan_where_it_was() {
-    let stream = stream(2, 0.1);
+    let stream = stream(2, either(0.05, 0.1));
     let pace = PATIENT;
     let ([touching, at_the_end], answers) = one_after_the_other(&stream, pace);
     let mut live = engine(&stream, pace, Gate::default());
@@ -347,7 +348,7 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
 /// Where the thread is done in time, no sample that waits would find another mesh.
 #[test]
 fn a_patch_in_time_equals_one_awaited_at_every_sample() {
-    let stream = stream(5, 0.1);
+    let stream = stream(5, either(0.06, 0.1));
     let mut patient = engine(&stream, PATIENT, Gate::default());
     let mut kept = Kept::new(&stream);
     for (i, sample) in stream.samples.iter().enumerate() {

@@ -182,8 +182,6 @@ export interface ReplayState {
   /** Where it runs ahead to; null: it plays. */
   target_s: number | null;
   is_at_end: boolean;
-  /** Touches that were taken out in the session. */
-  left_out: number;
   damage: string | null;
   /** Why there is none, or it does not go on. */
   error: string | null;

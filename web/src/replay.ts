@@ -138,7 +138,6 @@ export class Replay {
     const notes = [
       state.error === null ? "" : t("replayFailed", { reason: state.error }),
       state.damage === null ? "" : t("replayDamaged", { reason: state.damage }),
-      state.left_out === 0 ? "" : t("replayLeftOut", { count: state.left_out }),
     ];
     return notes.filter((note) => note !== "").join(" ");
   }

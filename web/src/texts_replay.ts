@@ -9,7 +9,6 @@ export const replayTexts = {
   replayBack: ["To the session that runs", "Zur laufenden Sitzung", "A la sesión en curso"],
   replayReading: ["Reading the session …", "Die Sitzung wird gelesen …", "Leyendo la sesión …"],
   replayAhead: ["Touched again from the scan on, up to {time}: {share}", "Wird vom Scan an neu angetastet, bis {time}: {share}", "Se toca de nuevo desde el escaneo, hasta {time}: {share}"],
-  replayLeftOut: ["Touches that were taken out do not come: {count}.", "Herausgenommene Antastungen kommen nicht vor: {count}.", "Los toques que se quitaron no aparecen: {count}."],
   replayDamaged: ["The recording is damaged and ends early: {reason}", "Die Aufzeichnung ist beschädigt und endet früher: {reason}", "La grabación está dañada y termina antes: {reason}"],
   replayFailed: ["The session cannot be replayed: {reason}", "Die Sitzung lässt sich nicht wiedergeben: {reason}", "La sesión no se puede reproducir: {reason}"],
   replayPlace: ["Place in the recording", "Stelle in der Aufzeichnung", "Punto de la grabación"],

@@ -41,6 +41,7 @@ pub use convert::{as_pose, as_wrench};
 pub use error::NodeError;
 pub use frame_resolver::CELL;
 pub use frames::{FrameBuffer, FrameError};
+pub use keeping::ReplayedSession;
 pub use running::{INBOX, Node, Prepared};
 pub use session::{NodeEnd, SessionReport};
 pub use setup::mesh_unit;

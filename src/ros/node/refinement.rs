@@ -323,9 +323,7 @@ impl RefinementWorker {
     ///
     /// - `at`: when the message came that completed the sample, where one did.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
-        if !self.follow_record(sample.stamp_ns) {
-            return;
-        }
+        self.follow_record(sample.stamp_ns);
         let begun = self.setup.clock.now();
         let answer = self.session.engine.answer(sample);
         let answered = self.setup.clock.now();
@@ -364,7 +362,7 @@ impl RefinementWorker {
         self.session.behind_lately.record(behind);
     }
 
-    pub(super) fn fail(&mut self, error: &LiveError) {
+    pub(super) fn fail(&mut self, error: &impl std::fmt::Display) {
         warn!(%error, "no samples are taken any more");
         self.fault = Some(error.to_string());
     }

@@ -1,9 +1,12 @@
-//! A session that was recorded, replayed: strokes are taken back and done again where they were, and nothing else acts on it.
+//! A session that was recorded, replayed: strokes are taken back, done again, taken out and put back where they were, and nothing
+//! else acts on it.
 
-use super::keeping::Keeping;
+use super::keeping::{Keeping, ReplayedSession};
 use super::refinement::RefinementWorker;
+use super::take_out::NO_PATCH;
 use crate::ros::messages::ProbeResult;
 use crate::ros::port::{Arrival, Call, ReplayStep};
+use crate::session::{EvidenceSource, Removal, StrokeChange};
 
 /// What calls are answered.
 pub(super) const REPLAYED: &str = "this is the replay of a session, in which nothing can be changed";
@@ -14,13 +17,12 @@ impl RefinementWorker {
         Arrival::Call(call).refuse(ProbeResult::NO_ARM, REPLAYED);
     }
 
-    /// Does what the record of a session that is replayed has before a sample; whether the sample is left.
-    pub(super) fn follow_record(&mut self, stamp_ns: i64) -> bool {
-        let Keeping::Replayed(replayed) = &mut self.session.keeping else { return true };
-        let changes: Vec<bool> = std::iter::from_fn(|| replayed.next_undo_before(stamp_ns)).collect();
-        let is_left = replayed.takes(stamp_ns);
-        changes.into_iter().for_each(|is_undo| self.change_stroke_as_recorded(is_undo));
-        is_left
+    /// Does what the record of a session that is replayed has before a sample.
+    pub(super) fn follow_record(&mut self, stamp_ns: i64) {
+        self.change_strokes_as_recorded(|replayed| replayed.next_change_before(stamp_ns));
+        if let Keeping::Replayed(replayed) = &mut self.session.keeping {
+            replayed.comes(stamp_ns);
+        }
     }
 
     /// Goes on with a replay.
@@ -32,23 +34,42 @@ impl RefinementWorker {
             ReplayStep::Again => self.begin_again().map(drop).map_err(|error| error.to_string()),
             ReplayStep::End => {
                 self.finish_samples();
-                self.end_record();
+                self.change_strokes_as_recorded(ReplayedSession::next_change_at_end);
                 self.fault.clone().map_or(Ok(()), Err)
             }
         }
     }
 
-    fn end_record(&mut self) {
-        let Keeping::Replayed(replayed) = &mut self.session.keeping else { return };
-        let changes: Vec<bool> = std::iter::from_fn(|| replayed.next_undo_at_end()).collect();
-        changes.into_iter().for_each(|is_undo| self.change_stroke_as_recorded(is_undo));
+    /// Makes the changes of strokes that are next.
+    fn change_strokes_as_recorded(&mut self, mut next: impl FnMut(&mut ReplayedSession) -> Option<StrokeChange>) {
+        while let Keeping::Replayed(replayed) = &mut self.session.keeping {
+            let Some(change) = next(replayed) else { return };
+            let done = match change {
+                StrokeChange::Undo(_) => self.session.engine.undo().map(drop).map_err(|error| error.to_string()),
+                StrokeChange::Redo(_) => self.session.engine.redo().map(drop).map_err(|error| error.to_string()),
+                StrokeChange::TakeOut(removal) | StrokeChange::PutBack(removal) => self.remake_as_recorded(removal),
+            };
+            match done {
+                Ok(()) => self.session.version += 1,
+                Err(error) => return self.fail(&error),
+            }
+        }
     }
 
-    fn change_stroke_as_recorded(&mut self, is_undo: bool) {
+    /// Makes the evidence again with or without a stroke, as the changes until then have it. Samples wait meanwhile.
+    fn remake_as_recorded(&mut self, removal: Removal) -> Result<(), String> {
+        let Keeping::Replayed(replayed) = &self.session.keeping else { return Ok(()) };
         let engine = &mut self.session.engine;
-        match if is_undo { engine.undo() } else { engine.redo() } {
-            Ok(_) => self.session.version += 1,
-            Err(error) => self.fail(&error),
-        }
+        let replay = engine.begin_replay().map_err(|error| error.to_string())?.ok_or(NO_PATCH)?;
+        let (recording, topics) = replayed.recording();
+        let source = EvidenceSource {
+            recording,
+            topics,
+            placement: self.setup.scene.placement(),
+            sync: self.setup.scene.sync_params(),
+            until_ns: removal.after_ns,
+        };
+        let evidence = source.replayed(&replayed.changes_so_far(), replay).map_err(|error| error.to_string())?;
+        engine.end_replay(Some(evidence)).and_then(|_| engine.catch_up()).map_err(|error| error.to_string())
     }
 }

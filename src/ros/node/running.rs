@@ -26,7 +26,6 @@ use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
 use crate::scene::{LeftOut, Memory, Scene, SceneCost};
-use crate::session::StrokeChanges;
 
 /// Inputs that wait for the view at most: frames of it are dropped first.
 const VIEW_QUEUE: usize = 256;
@@ -76,12 +75,17 @@ impl Prepared {
     /// [`ReplayStep`](crate::ros::port::ReplayStep)s between. Nothing is kept, calls are refused, and nothing is said of streams.
     ///
     /// - `parameters`: its scene, scan, unit and source.
+    /// - `replayed`: before its first message.
     ///
     /// # Errors
     /// [`NodeError`]
-    pub fn replayed(parameters: Parameters, folder: SessionFolder, changes: StrokeChanges) -> Result<Self, NodeError> {
+    pub fn replayed(
+        parameters: Parameters,
+        folder: SessionFolder,
+        replayed: ReplayedSession,
+    ) -> Result<Self, NodeError> {
         let setup = Arc::new(Setup::new(parameters, Clock::system())?);
-        let session = NodeSession::replayed(&setup, folder, ReplayedSession::new(changes))?;
+        let session = NodeSession::replayed(&setup, folder, replayed)?;
         setup.shared.mesh.name_session(&session.name);
         Ok(Self { setup, session })
     }

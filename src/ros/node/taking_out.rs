@@ -17,7 +17,7 @@ use super::take_out::{
 use crate::reconstruct::{Patcher, StrokeSpan};
 use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
-use crate::session::{EvidenceSource, StrokeChange, StrokeChanges};
+use crate::session::{EvidenceSource, Removal, StrokeChange, StrokeChanges};
 
 /// Why a touch stays where it is: without the samples that came meanwhile the others would not be what they are.
 fn too_many(dropped: u64) -> String {
@@ -190,12 +190,12 @@ impl RefinementWorker {
             };
             Ok(match (found.transpose()?, out) {
                 (Some((span, touches)), _) => {
-                    let change = StrokeChange::TakeOut(span);
+                    let change = StrokeChange::TakeOut(Removal { after_ns: until_ns, stroke: span });
                     let message = format!("took out 1 touch: {}", counted_contacts(touches.len()));
                     Remade { evidence: remade(change)?, change, answer: answer_of(span, &touches, message) }
                 }
                 (None, Some(span)) => {
-                    let change = StrokeChange::PutBack(span);
+                    let change = StrokeChange::PutBack(Removal { after_ns: until_ns, stroke: span });
                     let evidence = remade(change)?;
                     let touches = touches_of(evidence.patcher(), span);
                     let message = format!("put back 1 touch: {}", counted_contacts(touches.len()));

@@ -372,8 +372,8 @@ fn refined_case(name: &str, folder: &Path) -> Option<[PathBuf; 2]> {
 #[test]
 fn refined_meshes_come_onto_their_truth_from_anywhere() {
     let mut rng = Pcg64::new(77, 7);
-    let cases = [("plate", 1), ("featuretype", 1), ("flange", 2)];
-    for &(name, motions) in &cases[..either(1, 3)] {
+    let cases = [("plate", 1), ("flange", 2), ("featuretype", 1)];
+    for &(name, motions) in &cases[..either(2, 3)] {
         let folder = tempfile::tempdir().unwrap();
         let Some([refined, truth]) = refined_case(name, folder.path()) else { return };
         let [refined, truth] =

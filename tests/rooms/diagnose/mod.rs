@@ -1,6 +1,6 @@
 //! Mistakes made of sound recordings, and the cause that is named.
 
-use crate::full::is_full;
+use crate::full::either;
 use nalgebra::Vector3;
 use touchup::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
 use touchup::mesh::FaceTree;
@@ -76,7 +76,7 @@ fn missed(seed: u64) -> (Vec<&'static str>, usize) {
 
 #[test]
 fn sound_input_raises_no_alarm_and_each_mistake_is_named() {
-    for seed in [3, 4] {
+    for seed in 3..=either(3, 4) {
         assert_eq!(missed(seed).0, [""; 0], "seed {seed}");
     }
 }
@@ -99,10 +99,8 @@ fn a_part_touched_on_all_sides_of_an_open_scan_raises_no_alarm() {
 }
 
 #[test]
+#[ignore = "full"]
 fn over_twenty_seeds_nine_of_ten_mistakes_are_named() {
-    if !is_full() {
-        return;
-    }
     let (mut all, mut lost) = (0, 0);
     for seed in 1..=20 {
         let (missed, count) = missed(seed);

@@ -14,6 +14,7 @@ use touchup::stylus::Message;
 
 use super::samples::bench::{Bench, Plate, patches, read, refine};
 use super::samples::follower::Follower;
+use crate::full::either;
 
 /// A second of ROS, ns.
 const SECOND: i64 = 1_000_000_000;
@@ -135,7 +136,7 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
 /// Samples are taken, and what they say of the part cannot be.
 #[test]
 fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
-    let plate = Plate::touched(0.2);
+    let plate = Plate::touched(0.1);
     let states_of = |sign: f64| {
         let mut bench = Bench::start(&plate);
         bench.play_as(&plate.messages, |message| {
@@ -155,7 +156,7 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
         states
     };
     let sound = states_of(1.0);
-    assert!(sound.len() > 10 && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR), "{sound:?}");
+    assert!(sound.len() > 5 && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR), "{sound:?}");
     let reversed = states_of(-1.0);
     let (level, said) = reversed.last().unwrap();
     let is_named = said.starts_with("doubts its input (wrench_sign)") && said.contains("reverse the wrench");
@@ -176,7 +177,7 @@ fn a_wrong_stamp_costs_itself_alone() {
         ("four poses of 2038", true, &[447_483_644, 447_483_645, 447_483_646, 447_483_647]),
         ("three wrenches half a minute ahead", false, &[30, 31, 32]),
     ];
-    for (name, of_poses, ahead) in wrong {
+    for &(name, of_poses, ahead) in &wrong[..either(2, wrong.len())] {
         let bench = Bench::start(&plate);
         let mut inserted = 0;
         let mut number = 0;

@@ -232,7 +232,7 @@ impl Tally {
 /// which decides these; and of the decisions of all hardly any is wrong.
 #[test]
 fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
-    let (seeds, budget) = (either(6, 20), 100);
+    let (seeds, budget) = (either(4, 20), 100);
     let mut table = String::from(
         "| characteristic, ± tolerance | true value off nominal | until decided | fixed uncertainty | grid |\n|---|---|---|---|---|\n",
     );
@@ -276,7 +276,7 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
 /// 5 % + 2.33 √(0.05 · 0.95 / n) come out in 99 of 100 runs.
 #[test]
 fn looking_after_each_touch_keeps_the_stated_risk() {
-    let seeds = either(60, 500);
+    let seeds = either(40, 500);
     let confidence = touchup::conformity::repeated_confidence(0.95, 6, 39);
     for case in [HOLE, PLANE] {
         let limits = limits(&case, 1.0);

@@ -111,7 +111,7 @@ impl Normalised {
 #[test]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
-    let seeds = either(6, 20);
+    let seeds = either(3, 20);
     let noisy = SensorParams { pose_noise: 0.2e-3, orientation_noise: 0.3f64.to_radians(), ..SensorParams::default() };
     let styli = [
         ("usual", StylusParams::default(), 0.93),
@@ -126,10 +126,10 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
         "{:20} {:>9} {:>6} {:>7} {:>7} {:>7}   guessed: rms, 95 %",
         "", "vertices", "rms z", "68.3 %", "95 %", "99 %"
     );
-    for (name, stylus, least) in styli {
+    for &(name, ref stylus, least) in &styli[..either(2, styli.len())] {
         let (mut touched, mut guessed) = (Normalised::default(), Normalised::default());
         for seed in 101..=100 + seeds {
-            let (scan, touch, params) = touched_plate(&stylus, seed);
+            let (scan, touch, params) = touched_plate(stylus, seed);
             let patched = patched(&mut patcher_of(&touch.messages, params), &scan);
             touched.add(&patched, &Plate::default(), Support::Touched);
             guessed.add(&patched, &Plate::default(), Support::Guessed);

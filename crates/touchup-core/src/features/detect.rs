@@ -76,7 +76,7 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
     features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
     features.retain(|feature| !is_way_of_ball(feature));
-    let mut features = with_heads(&measure, without_second_holes(features));
+    let mut features = with_heads(&measure, without_second_walls(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
         let is_shut = slot.floor.is_some() || slot.is_closed;
@@ -86,7 +86,8 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     features.extend(measured.filter(|(slot, feature)| is_reported(slot, feature)).map(|(_, feature)| feature));
     features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
     let bosses = bosses(&parted, &walls);
-    features.extend(bosses.iter().map(|boss| boss_feature(&measure, &walls, boss)));
+    let raised = bosses.iter().map(|boss| boss_feature(&measure, &walls, boss)).collect();
+    features.extend(without_second_walls(raised));
     let is_shaft = |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
     features.extend((0..walls.len()).filter(is_shaft).map(|at| cylinder_feature(&measure, &walls[at])));
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
@@ -141,7 +142,7 @@ fn is_same_head(known: &Feature, head: &Feature) -> bool {
     let wide = |feature: &Feature| feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
     let near = 0.5 * wide(head);
     let is_near = (known.centre.value - head.centre.value).norm() < near;
-    known.kind == Kind::Hole && is_near && (wide(known) - wide(head)).abs() < ONE_BORE * wide(head)
+    known.kind == Kind::Hole && is_near && (wide(known) - wide(head)).abs() < ONE_WALL * wide(head)
 }
 
 fn head_feature(measure: &Measure, head: &Head) -> Feature {
@@ -162,44 +163,44 @@ fn head_feature(measure: &Measure, head: &Head) -> Feature {
     }
 }
 
-/// Holes are one bore when their axes are within 11°, no farther apart than this share of the diameter where they overlap, and as wide
+/// Holes, or bosses, are one wall when their axes are within 11°, no farther apart than this share of the diameter where they overlap, and as wide
 /// within that share.
 const ONE_AXIS: f64 = 0.98;
-const ONE_BORE: f64 = 0.15;
+const ONE_WALL: f64 = 0.15;
 
-/// Without holes that are another one again: seen from its other end, or in what the mesh has of a bore beside what was felt of it. Of two that
-/// with the most touches is kept, and the deeper one where both have none.
-fn without_second_holes(mut features: Vec<Feature>) -> Vec<Feature> {
-    let is_round = |feature: &Feature| matches!(feature.kind, Kind::Hole | Kind::Notch);
+/// Without those of holes, or of bosses, that are another one again: seen from its other end, or in what the mesh has of a wall beside what was
+/// felt of it. Of two that with the most touches is kept, and the deeper one where both have none.
+fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
     let depth = |feature: &Feature| feature.depth.as_ref().map_or(0.0, |depth| depth.value);
     let touches = |feature: &Feature| feature.diameter.as_ref().map_or(0, |diameter| diameter.touches.len());
     let is_second = |at: usize, of: usize| {
         let (one, other) = (&features[at], &features[of]);
         let rank = |feature: &Feature| (touches(feature), depth(feature));
         let is_less = rank(one) < rank(other) || (rank(one) == rank(other) && at > of);
-        at != of && is_round(one) && is_round(other) && is_less && is_one_bore(one, other)
+        at != of && is_less && is_one_wall(one, other)
     };
     let first: Vec<usize> =
         (0..features.len()).filter(|&at| !(0..features.len()).any(|of| is_second(at, of))).collect();
     first.into_iter().map(|at| std::mem::take(&mut features[at])).collect()
 }
 
-/// Whether two holes overlap along one axis over more than half of the shorter one, and are as wide.
-fn is_one_bore(one: &Feature, other: &Feature) -> bool {
-    // from its bottom to its opening, and how wide
-    let bore = |feature: &Feature| {
+/// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one, and are as wide.
+fn is_one_wall(one: &Feature, other: &Feature) -> bool {
+    // from its bottom to its opening, or from its foot to its top, and how wide
+    let wall = |feature: &Feature| {
         let (axis, depth) = (feature.axis.as_ref()?.value, feature.depth.as_ref()?.value);
-        let bottom = feature.centre.value - axis * depth;
+        let is_hole = matches!(feature.kind, Kind::Hole | Kind::Notch);
+        let bottom = feature.centre.value - axis * if is_hole { depth } else { 0.0 };
         (depth > 0.0).then_some((bottom, axis, depth, feature.diameter.as_ref()?.value))
     };
-    let (Some((bottom, axis, depth, wide)), Some(other)) = (bore(one), bore(other)) else { return false };
+    let (Some((bottom, axis, depth, wide)), Some(other)) = (wall(one), wall(other)) else { return false };
     let (other_bottom, other_axis, other_depth, other_wide) = other;
     let from = (other_bottom - bottom).dot(&axis);
     let to = from + other_depth * other_axis.dot(&axis);
     let overlap = from.max(to).min(depth) - from.min(to).max(0.0);
     let middle = other_bottom + other_axis * (other_depth / 2.0) - bottom;
     let aside = (middle - axis * middle.dot(&axis)).norm();
-    let near = ONE_BORE * wide.min(other_wide);
+    let near = ONE_WALL * wide.min(other_wide);
     let is_along = axis.dot(&other_axis).abs() > ONE_AXIS;
     is_along && overlap > 0.5 * depth.min(other_depth) && (wide - other_wide).abs() < near && aside < near
 }

@@ -13,4 +13,4 @@ pub use outcome::{Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, f
 pub use outliers::UncertaintySummary;
 pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};
 pub use remade::{EvidenceSource, RemakeError};
-pub use strokes::{Exchange, StrokeChange, StrokeChanges, StrokeReplay};
+pub use strokes::{Exchange, Removal, StrokeChange, StrokeChanges, StrokeHistory, StrokeReplay};

@@ -16,9 +16,19 @@ pub enum StrokeChange {
     /// the stroke was done again that was taken back last
     Redo(Exchange),
     /// the samples of a stroke were taken out, as if they had never come
-    TakeOut(StrokeSpan),
+    TakeOut(Removal),
     /// … and put back, as if they had never been taken out
-    PutBack(StrokeSpan),
+    PutBack(Removal),
+}
+
+impl StrokeChange {
+    /// After the sample of this stamp, ns.
+    pub fn after_ns(&self) -> i64 {
+        match self {
+            Self::Undo(exchange) | Self::Redo(exchange) => exchange.after_ns,
+            Self::TakeOut(removal) | Self::PutBack(removal) => removal.after_ns,
+        }
+    }
 }
 
 /// When a stroke was taken back or done again, and which.
@@ -28,6 +38,16 @@ pub struct Exchange {
     pub after_ns: i64,
     /// its touch-down, ns; `None` where there is no patch
     pub stroke_ns: Option<i64>,
+}
+
+/// When the samples of a stroke were taken out or put back, and which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Removal {
+    /// after the sample of this stamp, ns
+    pub after_ns: i64,
+    /// from touch-down until the next
+    pub stroke: StrokeSpan,
 }
 
 /// All changes of strokes in a session, in their order.
@@ -56,8 +76,8 @@ impl StrokeChanges {
         let mut spans = Vec::new();
         for change in &self.0 {
             match change {
-                StrokeChange::TakeOut(span) => spans.push(*span),
-                StrokeChange::PutBack(span) => spans.retain(|out| out != span),
+                StrokeChange::TakeOut(removal) => spans.push(removal.stroke),
+                StrokeChange::PutBack(removal) => spans.retain(|out| *out != removal.stroke),
                 StrokeChange::Undo(_) | StrokeChange::Redo(_) => {}
             }
         }
@@ -69,7 +89,7 @@ impl StrokeChanges {
         self.0.iter().any(|change| matches!(change, StrokeChange::Undo(_) | StrokeChange::Redo(_)))
     }
 
-    /// What is to be done along the samples of the session.
+    /// What is to be done along the samples of the session for its end: strokes that are taken out never come.
     pub fn replay(&self) -> StrokeReplay {
         let taken_out = self.taken_out();
         let is_left = |exchange: &Exchange| {
@@ -83,6 +103,11 @@ impl StrokeChanges {
         });
         let exchanges = exchanges.collect::<Vec<_>>().into_iter().peekable();
         StrokeReplay { taken_out, exchanges }
+    }
+
+    /// All that was done along the samples of the session, as it came.
+    pub fn history(self) -> StrokeHistory {
+        StrokeHistory { changes: self, done: 0 }
     }
 }
 
@@ -106,12 +131,42 @@ impl StrokeReplay {
     }
 }
 
+/// Walks along all samples of a session, with each change where it was made.
+#[derive(Clone, Debug)]
+pub struct StrokeHistory {
+    changes: StrokeChanges,
+    done: usize,
+}
+
+impl StrokeHistory {
+    /// The next change that was made before the sample of this stamp.
+    pub fn next_before(&mut self, stamp_ns: i64) -> Option<StrokeChange> {
+        let next = self.changes.0.get(self.done).filter(|change| change.after_ns() < stamp_ns);
+        self.done += usize::from(next.is_some());
+        next.copied()
+    }
+
+    /// Those that [`Self::next_before`] has returned.
+    pub fn so_far(&self) -> StrokeChanges {
+        self.changes.0.iter().take(self.done).copied().collect()
+    }
+
+    /// The same from its beginning.
+    pub fn again(self) -> Self {
+        self.changes.history()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn span(from_ns: i64) -> StrokeSpan {
         StrokeSpan { from_ns, until_ns: from_ns + 100 }
+    }
+
+    fn removal(after_ns: i64, from_ns: i64) -> Removal {
+        Removal { after_ns, stroke: span(from_ns) }
     }
 
     fn exchange(after_ns: i64, stroke_ns: i64) -> Exchange {
@@ -123,14 +178,15 @@ mod tests {
         use StrokeChange::{PutBack, Redo, TakeOut, Undo};
         // strokes at 100, 200 and 300; two are taken back, one is done again; then that one goes
         let back = [Undo(exchange(390, 300)), Undo(exchange(390, 200)), Redo(exchange(390, 200))];
-        let changes: StrokeChanges = back.into_iter().chain([TakeOut(span(200)), TakeOut(span(100))]).collect();
+        let changes: StrokeChanges =
+            back.into_iter().chain([TakeOut(removal(395, 200)), TakeOut(removal(395, 100))]).collect();
         let mut replay = changes.replay();
         assert!(replay.takes(99) && !replay.takes(100) && !replay.takes(299) && replay.takes(300));
         assert_eq!(replay.next_before(390), None);
         assert_eq!(replay.next_before(391), Some((exchange(390, 300), true)));
         assert_eq!(replay.next_before(i64::MAX), None);
 
-        let changes: StrokeChanges = changes.0.into_iter().chain([PutBack(span(200))]).collect();
+        let changes: StrokeChanges = changes.0.into_iter().chain([PutBack(removal(399, 200))]).collect();
         assert_eq!(changes.taken_out(), [span(100)]);
         let mut replay = changes.replay();
         assert!(!replay.takes(199) && replay.takes(200));
@@ -138,12 +194,34 @@ mod tests {
         assert_eq!(left, [true, true, false]);
     }
 
+    #[test]
+    fn a_history_has_each_change_once_where_it_was_made() {
+        use StrokeChange::{PutBack, TakeOut, Undo};
+        let all =
+            [Undo(exchange(150, 100)), TakeOut(removal(250, 0)), PutBack(removal(250, 0)), Undo(exchange(400, 300))];
+        let mut history = all.into_iter().collect::<StrokeChanges>().history();
+        for _ in 0..2 {
+            assert_eq!((history.next_before(150), history.so_far().is_empty()), (None, true));
+            assert_eq!(history.next_before(151), Some(all[0]));
+            assert_eq!(history.next_before(250), None);
+            assert_eq!(
+                [300, 300, 300].map(|stamp_ns| history.next_before(stamp_ns)),
+                [Some(all[1]), Some(all[2]), None]
+            );
+            assert_eq!(history.so_far(), all[..3].iter().copied().collect());
+            history = history.again();
+        }
+    }
+
     /// The lines of `strokes.jsonl`.
     #[test]
     fn a_change_is_one_object_that_names_itself() {
         let lines = [
             (StrokeChange::Undo(exchange(5, 3)), r#"{"change":"undo","after_ns":5,"stroke_ns":3}"#),
-            (StrokeChange::TakeOut(span(7)), r#"{"change":"take_out","from_ns":7,"until_ns":107}"#),
+            (
+                StrokeChange::TakeOut(removal(150, 7)),
+                r#"{"change":"take_out","after_ns":150,"stroke":{"from_ns":7,"until_ns":107}}"#,
+            ),
         ];
         for (change, line) in lines {
             assert_eq!(serde_json::to_string(&change).unwrap(), line);

@@ -69,11 +69,10 @@ impl ReplayControl {
     /// All is read.
     ///
     /// - `end_ns`: time of the last message.
-    /// - `left_out`: touches that do not come.
     /// - `damage`: where the recording is damaged, and ends.
-    pub(super) fn begin(&self, end_ns: i64, left_out: usize, damage: Option<String>) {
+    pub(super) fn begin(&self, end_ns: i64, damage: Option<String>) {
         let mut progress = locked(&self.progress);
-        (progress.is_ready, progress.end_ns, progress.left_out, progress.damage) = (true, end_ns, left_out, damage);
+        (progress.is_ready, progress.end_ns, progress.damage) = (true, end_ns, damage);
     }
 
     /// It does not go on: says why, and returns when nobody looks any more.
@@ -138,7 +137,7 @@ mod tests {
     fn replay() -> (Arc<ReplayControl>, ManualClock) {
         let (clock, hand) = Clock::manual();
         let control = Arc::new(ReplayControl::new("monday", clock));
-        control.begin(100 * S, 1, None);
+        control.begin(100 * S, None);
         (control, hand)
     }
 
@@ -173,7 +172,7 @@ mod tests {
         hand.advance(Duration::from_millis(1));
         assert_eq!(next.recv(), Ok(ReplayNext::Go));
         let shown = control.shown();
-        assert_eq!((shown.at_s, shown.end_s, shown.speed, shown.left_out), (18.0, 100.0, 16.0, 1));
+        assert_eq!((shown.at_s, shown.end_s, shown.speed), (18.0, 100.0, 16.0));
     }
 
     #[test]

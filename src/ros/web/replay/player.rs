@@ -14,7 +14,7 @@ use crate::clock::Clock;
 use crate::io::session_folder::SessionFolder;
 use crate::ros::in_process::{self, OtherParticipants};
 use crate::ros::inbox::{Inbox, inbox};
-use crate::ros::node::{CELL, Node, Prepared, as_pose, as_wrench};
+use crate::ros::node::{CELL, Node, Prepared, ReplayedSession, as_pose, as_wrench};
 use crate::ros::parameters::{ParameterValue, Parameters};
 use crate::ros::port::{Arrival, ReplayStep, SamplePort};
 use crate::ros::web::annotations::Annotations;
@@ -82,8 +82,8 @@ impl Player {
         let record = SessionRecord::open(folder.path()).map_err(|error| error.to_string())?;
         let SessionRecord { scan, mesh_unit, scene, recording, topics, .. } = record;
         let source = if topics.pose.starts_with("/probe/") { "probe" } else { "stylus" };
-        let read = SessionRecording::read(recording, topics, source, || !control.is_closed());
-        let recording = read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
+        let read = SessionRecording::read(recording.clone(), topics.clone(), source, || !control.is_closed());
+        let readable = read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
         // of a session that goes on: after its messages, so that what was undone before one of them is not missing
         let changes = SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
         let parameters = [
@@ -96,8 +96,8 @@ impl Player {
         for (name, value) in parameters {
             all.set(name, &value).map_err(|error| error.to_string())?;
         }
-        let left_out = changes.taken_out().len();
-        let ready = Prepared::replayed(all, folder.clone(), changes).map_err(|error| error.to_string())?;
+        let ready = Prepared::replayed(all, folder.clone(), ReplayedSession::new(recording, topics, changes))
+            .map_err(|error| error.to_string())?;
         let clock = Clock::system();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);
@@ -120,8 +120,8 @@ impl Player {
         });
         let port = Arc::new(PagePort { network, site: Arc::clone(&site) });
         let node = ready.start(port, arrivals, None).map_err(|error| error.to_string())?;
-        control.begin(recording.end_ns, left_out, recording.damage.clone());
-        Ok(ReplayStage { recording, site, inbox, stylus, node })
+        control.begin(readable.end_ns, readable.damage.clone());
+        Ok(ReplayStage { recording: readable, site, inbox, stylus, node })
     }
 }
 

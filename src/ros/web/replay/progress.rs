@@ -28,7 +28,6 @@ pub(super) struct ReplayProgress {
     pub end_ns: i64,
     pub target_ns: Option<i64>,
     pub is_at_end: bool,
-    pub left_out: usize,
     pub damage: Option<String>,
     pub error: Option<String>,
     pub starts_again: bool,
@@ -50,7 +49,6 @@ impl Default for ReplayProgress {
             end_ns: 0,
             target_ns: None,
             is_at_end: false,
-            left_out: 0,
             damage: None,
             error: None,
             starts_again: false,
@@ -75,7 +73,6 @@ impl ReplayProgress {
             end_s: seconds(self.end_ns),
             target_s: self.target_ns.map(seconds),
             is_at_end: self.is_at_end,
-            left_out: self.left_out,
             damage: self.damage.clone(),
             error: self.error.clone(),
         }

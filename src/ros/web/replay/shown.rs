@@ -23,8 +23,6 @@ pub(in crate::ros::web) struct ReplayShown {
     pub target_s: Option<f64>,
     /// all has come
     pub is_at_end: bool,
-    /// touches that were taken out in the session: they do not come
-    pub left_out: usize,
     /// where the recording is damaged, and ends
     pub damage: Option<String>,
     /// why it does not go on

@@ -31,7 +31,8 @@ const LEFT_OVER: f64 = 0.05;
 const AT_RIMS: f64 = 0.003;
 /// Weight of features that decides: one opening, or what else is as much.
 const FEATURES: f64 = 1.0;
-/// A feature is not there when it is off by so many times what half of those that are there are off …
+/// A feature that one motion has in its place is missing by another when it is off by more: by so many times what half of those that are in
+/// their places are off …
 const ABSENT: f64 = 3.0;
 /// … but at least, and at most, by so much of what it may be.
 const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
@@ -68,7 +69,7 @@ impl Judged {
         self.explained().map(|[own, _]| matching.source[own].weight()).sum()
     }
 
-    /// From which misfit on a feature is not there, by how well others fit.
+    /// By how much more a feature has to be off to be missing, by how well others fit.
     fn absent(&self) -> f64 {
         let mut misfits: Vec<f64> = self.explained().map(|[own, _]| self.misfit(own)).collect();
         (ABSENT * median(&mut misfits).unwrap_or(1.0)).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
@@ -175,7 +176,7 @@ impl<'a> Judge<'a> {
         let alone = |a: &Judged, b: &Judged| -> f64 {
             let absent = a.absent();
             let own = self.matching.source.iter().enumerate();
-            own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > absent.max(a.misfit(*i)))
+            own.filter(|(i, _)| a.misfit(*i) <= 1.0 && b.misfit(*i) > a.misfit(*i) + absent)
                 .map(|(_, own)| own.weight())
                 .sum()
         };
