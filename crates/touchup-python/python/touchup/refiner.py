@@ -62,7 +62,7 @@ class Refiner(_touchup.Refiner):
     >>> triangle = ([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]], [[0, 1, 2]])
     >>> refiner = touchup.Refiner(triangle, {"tip": {"radius_mm": 1.0}})
     >>> refiner.push(0, (0.003, 0.003, 0.001), (0, 0, 0, 1), (0, 0, 2.0)).case
-    'free'
+    'surface_only'
     """
 
     _touches = False
