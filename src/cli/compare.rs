@@ -10,6 +10,7 @@ use nalgebra::{Isometry3, Point3};
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
+pub use self::table::comparison_json;
 use self::table::{CompareReport, diagonal};
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;

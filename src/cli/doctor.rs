@@ -94,7 +94,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
 ///
 /// # Errors
 /// The first that is.
-pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
+pub fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
     match findings.iter().find(|finding| finding.is_sure) {
         Some(finding) => {
             let input = format!("{} on {}", recording.display(), scan.display());

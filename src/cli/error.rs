@@ -6,7 +6,6 @@ use std::fmt::Display;
 use std::io::{self, ErrorKind, Write, stderr};
 use std::iter::successors;
 use std::path::Path;
-use std::process::ExitCode;
 
 use serde::Serialize;
 
@@ -32,7 +31,7 @@ pub(super) type Losses = Vec<String>;
 
 /// Why a command ended with another exit code than 0, as `--json` prints it.
 #[derive(Debug, Serialize)]
-pub(super) struct CliError {
+pub struct CliError {
     /// what is wrong: `usage`, `scene`, `mesh`, `recording`, `not_written`, `losses`, …
     pub kind: &'static str,
     /// in words, with values and units
@@ -144,23 +143,23 @@ pub(super) fn asks_for_json(arguments: &[OsString]) -> bool {
 }
 
 /// Prints an error as one line on stderr.
-pub(super) fn print_error(as_json: bool, error: &CliError) -> ExitCode {
+pub(super) fn print_error(as_json: bool, error: &CliError) -> u8 {
     let json = || serde_json::to_string(error).expect("a number and texts alone cannot fail");
     let line = if as_json { json() } else { format!("touchup: {}", error.message) };
     // a closed pipe has no reader left
     let _ = writeln!(stderr(), "{line}");
-    ExitCode::from(error.exit_code)
+    error.exit_code
 }
 
 /// Prints arguments that cannot be parsed, or the help or version that they ask for (exit code 0).
-pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> ExitCode {
+pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> u8 {
     let exit_code = error.exit_code() as u8;
     if exit_code == 0 || !as_json {
         return match error.print() {
             Err(failed) if exit_code == 0 && failed.kind() != ErrorKind::BrokenPipe => {
                 print_error(as_json, &failed.into())
             }
-            _ => ExitCode::from(exit_code),
+            _ => exit_code,
         };
     }
     let text = error.to_string();

@@ -52,7 +52,13 @@ mod ur;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod web;
 
-use error::{CliError, Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
+pub use compare::comparison_json;
+pub use doctor::refuse_unsound;
+pub use error::CliError;
+pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
+pub use simulated_world::OffFactor;
+
+use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{
     by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify, print_report, print_result,
     write_json,
@@ -159,6 +165,11 @@ enum Verb {
 
 /// Runs the verb that `arguments` name, the program's own name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    exit_code(arguments).into()
+}
+
+/// The same for a program that is not ours, as the Python package: the exit code as a number.
+pub fn exit_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let (arguments, ros) = split(arguments);
     let as_json = asks_for_json(&arguments);
     let arguments = match Arguments::try_parse_from(arguments) {
@@ -167,7 +178,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let ended = ros_arguments(&arguments.verb, ros).and_then(|ros| arguments.verb.run(&ros));
     match ended {
-        Ok(losses) if losses.is_empty() => ExitCode::SUCCESS,
+        Ok(losses) if losses.is_empty() => 0,
         Ok(losses) => {
             let message = format!("done with losses: {}", losses.join("; "));
             print_error(as_json, &CliError { kind: "losses", message, hint: None, exit_code: 4 })

@@ -18,8 +18,8 @@ use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::scan::{Scan, read_scan};
 use crate::sim::{
-    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimWorld, Stroke, StylusParams,
-    Surface, Touch, plan_sides, scan, see_markers, touch,
+    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimError, SimWorld, Stroke,
+    StylusParams, Surface, Touch, plan_sides, scan, see_markers, touch,
 };
 use crate::stylus::{MarkerFrame, Message};
 
@@ -49,46 +49,70 @@ pub(super) struct SimulateArguments {
     /// Folder for truth.ply, scan.ply (both in mm) and touch.mcap
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Another seed makes another scan and another path
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Draws the truth of all that is not named from the ranges of a world, and writes what a calibration tells of it as scene.yaml (for
-    /// refine --scene) and each true value as truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
-    #[arg(long, value_name = "NAME", value_parser = world_named, conflicts_with = "markers")]
-    world: Option<SimWorld>,
-    /// By which factor the errors of what is told are larger than the scene says: 3 for all, radius=3 for one (radius, stiffness,
-    /// tip-offset, registration, clock, tare); may be given again
-    #[arg(long, value_name = "FACTOR", requires = "world")]
-    told_off: Vec<OffFactor>,
-    /// True radius of the ball, mm [default: 1.5, or as the world draws it]
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    tip_radius_mm: Option<f64>,
-    /// True stiffness of stylus and holder at the ball, N/mm [default: 20, or as the world draws it]
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
-    stiffness_n_per_mm: Option<f64>,
-    /// Coefficient of friction between ball and part [default: 0.15, or as the world draws it]
-    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
-    friction: Option<f64>,
-    /// Median edge of the scan's triangles, mm [default: 2.4, or as the world draws it]
-    #[arg(long, value_name = "E", allow_negative_numbers = true)]
-    scan_edge_mm: Option<f64>,
-    /// Noise of the scan along its normals, mm [default: 0.6, or as the world draws it]
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    scan_noise_mm: Option<f64>,
-    /// How good the scanner is [default: cheap, or as the world draws it]
-    #[arg(long, value_enum)]
-    scanner: Option<ScannerKind>,
-    /// Sides of the part from which the hand reaches it, by the axis that points there: z,x,-y
-    #[arg(long, value_name = "AXES", value_delimiter = ',', default_value = "z", allow_hyphen_values = true)]
-    sides: Vec<Side>,
+    #[command(flatten)]
+    settings: SimulationSettings,
     /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic /stylus/markers
     #[arg(long)]
     markers: bool,
 }
 
+/// What is drawn or named of a simulated scan and touch.
+#[derive(Clone, Debug, Args)]
+pub struct SimulationSettings {
+    /// Another seed makes another scan and another path
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Draws the truth of all that is not named from the ranges of a world, and writes what a calibration tells of it as scene.yaml (for
+    /// refine --scene) and each true value as truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
+    #[arg(long, value_name = "NAME", value_parser = world_named, conflicts_with = "markers")]
+    pub world: Option<SimWorld>,
+    /// By which factor the errors of what is told are larger than the scene says: 3 for all, radius=3 for one (radius, stiffness,
+    /// tip-offset, registration, clock, tare); may be given again
+    #[arg(long, value_name = "FACTOR", requires = "world")]
+    pub told_off: Vec<OffFactor>,
+    /// True radius of the ball, mm [default: 1.5, or as the world draws it]
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    pub tip_radius_mm: Option<f64>,
+    /// True stiffness of stylus and holder at the ball, N/mm [default: 20, or as the world draws it]
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    pub stiffness_n_per_mm: Option<f64>,
+    /// Coefficient of friction between ball and part [default: 0.15, or as the world draws it]
+    #[arg(long, value_name = "MU", allow_negative_numbers = true)]
+    pub friction: Option<f64>,
+    /// Median edge of the scan's triangles, mm [default: 2.4, or as the world draws it]
+    #[arg(long, value_name = "E", allow_negative_numbers = true)]
+    pub scan_edge_mm: Option<f64>,
+    /// Noise of the scan along its normals, mm [default: 0.6, or as the world draws it]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub scan_noise_mm: Option<f64>,
+    /// How good the scanner is [default: cheap, or as the world draws it]
+    #[arg(long, value_enum)]
+    pub scanner: Option<ScannerKind>,
+    /// Sides of the part from which the hand reaches it, by the axis that points there: z,x,-y
+    #[arg(long, value_name = "AXES", value_delimiter = ',', default_value = "z", allow_hyphen_values = true)]
+    pub sides: Vec<Side>,
+}
+
+impl Default for SimulationSettings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            world: None,
+            told_off: Vec::new(),
+            tip_radius_mm: None,
+            stiffness_n_per_mm: None,
+            friction: None,
+            scan_edge_mm: None,
+            scan_noise_mm: None,
+            scanner: None,
+            sides: vec![Side { towards: Vector3::z_axis() }],
+        }
+    }
+}
+
 /// How good a scanner is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ScannerKind {
+pub enum ScannerKind {
     /// hand-held: noisy, rounded, holes closed over
     Cheap,
     /// stationary: fine and exact, without the floors of deep holes
@@ -97,7 +121,7 @@ enum ScannerKind {
 
 /// A side of the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Side {
+pub struct Side {
     /// towards the hand, in O
     towards: Unit<Vector3<f64>>,
 }
@@ -119,50 +143,19 @@ impl FromStr for Side {
 
 /// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
-    if let Some(given) = arguments.tip_radius_mm {
-        let (smallest, largest) = (TIP_RADII_MM.start(), TIP_RADII_MM.end());
-        let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
-        require(TIP_RADII_MM.contains(&given), why)?;
-    }
+    arguments.settings.check()?;
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
     let Scan { mesh: truth, repair, .. } = read_scan(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
         warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
     }
     let surface = MeshSurface::new(&truth)?;
-    let off = OffFactor::joined(&arguments.told_off)?;
-    let mut drawn = arguments.world.map(|world| world.draw_told_off(arguments.seed, &off)).transpose()?;
-    let usual = || (ScannerParams::default(), StylusParams::default());
-    let (mut scanner, mut stylus) = drawn.as_ref().map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
-    if let Some(kind) = arguments.scanner {
-        scanner = if kind == ScannerKind::Good { ScannerParams::good() } else { ScannerParams::default() };
-        if let Some(drawn) = &mut drawn {
-            drawn.set_truth("scan_edge", scanner.edge);
-            drawn.set_truth("scan_noise", scanner.noise);
-        }
-    }
-    scanner.seed = arguments.seed;
-    for (given, unit, name, place) in [
-        (arguments.tip_radius_mm, 1e-3, "tip_radius", &mut stylus.radius),
-        (arguments.stiffness_n_per_mm, 1e3, "stiffness", &mut stylus.stiffness),
-        (arguments.friction, 1.0, "friction", &mut stylus.friction),
-        (arguments.scan_edge_mm, 1e-3, "scan_edge", &mut scanner.edge),
-        (arguments.scan_noise_mm, 1e-3, "scan_noise", &mut scanner.noise),
-    ] {
-        let Some(given) = given else { continue };
-        *place = given * unit;
-        if let Some(drawn) = &mut drawn {
-            drawn.set_truth(name, given * unit);
-        }
-    }
+    let world = arguments.settings.world()?;
     let camera = arguments.markers.then(CameraParams::default);
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
-    let habit = drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit);
-    let sides: Vec<_> = arguments.sides.iter().map(|side| side.towards).collect();
     let stage = WorkProgress::stage("strokes");
-    let path = plan_sides(&surface, &sides, habit, &hand)?;
+    let path = world.path(&surface, &arguments.settings.sides)?;
     drop(stage);
-    let out = &arguments.out;
+    let (out, SimulationWorld { scanner, stylus, drawn }) = (&arguments.out, world);
     let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &stylus, camera.as_ref(), out)?;
     if let Some(drawn) = &drawn {
         write_told_scene(drawn, DrawnWorld::lever(&surface), &out.join("scene.yaml"))?;
@@ -177,6 +170,89 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
         out.display()
     ))?;
     Ok(Losses::new())
+}
+
+/// Scanner, stylus and hand as they truly are, and the world that they were drawn from.
+struct SimulationWorld {
+    scanner: ScannerParams,
+    stylus: StylusParams,
+    drawn: Option<DrawnWorld>,
+}
+
+impl SimulationWorld {
+    fn path(&self, surface: &dyn Surface, sides: &[Side]) -> Result<Vec<Stroke>, SimError> {
+        let hand = PathParams { radius: self.stylus.radius, ..PathParams::default() };
+        let habit = self.drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit);
+        let sides: Vec<_> = sides.iter().map(|side| side.towards).collect();
+        plan_sides(surface, &sides, habit, &hand)
+    }
+}
+
+/// A scan and a touch of a part, without files.
+#[derive(Debug)]
+pub struct Simulation {
+    /// what the scanner made of the part
+    pub scan: TriMesh,
+    /// what the hand touched
+    pub touch: Touch,
+    /// what a calibration tells of the world, as the text of a scene; none without a world
+    pub scene: Option<String>,
+}
+
+impl SimulationSettings {
+    /// Scans and touches a part.
+    ///
+    /// - `truth`: the part, closed, m.
+    ///
+    /// # Errors
+    /// [`CliError`] for settings out of their range and for a part that cannot be touched.
+    pub fn simulated(&self, truth: &TriMesh) -> Result<Simulation, CliError> {
+        self.check()?;
+        let surface = MeshSurface::new(truth)?;
+        let world = self.world()?;
+        let path = world.path(&surface, &self.sides)?;
+        let scan = scan(&surface, &world.scanner)?;
+        let touch = touch(&surface, &path, &world.stylus, world.scanner.seed)?;
+        let scene = world.drawn.map(|drawn| drawn.told_scene(DrawnWorld::lever(&surface)));
+        Ok(Simulation { scan, touch, scene })
+    }
+
+    fn check(&self) -> Result<(), CliError> {
+        let Some(given) = self.tip_radius_mm else { return Ok(()) };
+        let (smallest, largest) = (TIP_RADII_MM.start(), TIP_RADII_MM.end());
+        let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
+        require(TIP_RADII_MM.contains(&given), why)
+    }
+
+    /// As it is drawn, with what is named put in place of it.
+    fn world(&self) -> Result<SimulationWorld, CliError> {
+        let off = OffFactor::joined(&self.told_off)?;
+        let mut drawn = self.world.map(|world| world.draw_told_off(self.seed, &off)).transpose()?;
+        let usual = || (ScannerParams::default(), StylusParams::default());
+        let (mut scanner, mut stylus) = drawn.as_ref().map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
+        if let Some(kind) = self.scanner {
+            scanner = if kind == ScannerKind::Good { ScannerParams::good() } else { ScannerParams::default() };
+            if let Some(drawn) = &mut drawn {
+                drawn.set_truth("scan_edge", scanner.edge);
+                drawn.set_truth("scan_noise", scanner.noise);
+            }
+        }
+        scanner.seed = self.seed;
+        for (given, unit, name, place) in [
+            (self.tip_radius_mm, 1e-3, "tip_radius", &mut stylus.radius),
+            (self.stiffness_n_per_mm, 1e3, "stiffness", &mut stylus.stiffness),
+            (self.friction, 1.0, "friction", &mut stylus.friction),
+            (self.scan_edge_mm, 1e-3, "scan_edge", &mut scanner.edge),
+            (self.scan_noise_mm, 1e-3, "scan_noise", &mut scanner.noise),
+        ] {
+            let Some(given) = given else { continue };
+            *place = given * unit;
+            if let Some(drawn) = &mut drawn {
+                drawn.set_truth(name, given * unit);
+            }
+        }
+        Ok(SimulationWorld { scanner, stylus, drawn })
+    }
 }
 
 /// A simulated scan and touch.

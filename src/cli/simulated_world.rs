@@ -12,7 +12,7 @@ use crate::sim::{DrawnValue, DrawnWorld, SimWorld, ToldOff};
 
 /// A factor for all that is told, or for one of it.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct OffFactor {
+pub struct OffFactor {
     quantity: Option<String>,
     factor: f64,
 }

@@ -42,6 +42,10 @@ const MAY_USE: &[(&str, &str)] = &[
         "report",
         "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",
     ),
+    (
+        "python",
+        "numeric parameters stylus mesh reconstruct haptic live features align sim compare diagnose io threads scan scene session replay",
+    ),
     ("ur", "clock stylus plan arm"),
     (
         "ros",
@@ -61,7 +65,7 @@ const MAY_USE: &[(&str, &str)] = &[
 const PURE: &[&str] = &["touchup-core", "touchup-sim"];
 
 /// The only places with Python.
-const MAY_USE_PYTHON: &[&str] = &["src/ur/child/"];
+const MAY_USE_PYTHON: &[&str] = &["src/ur/child/", "crates/touchup-python/"];
 
 /// What a pure crate may not name.
 const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];
@@ -269,7 +273,8 @@ impl<'a> Place<'a> {
 }
 
 /// Crates that are one room each, and its name.
-const WHOLE: &[(&str, &str)] = &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report")];
+const WHOLE: &[(&str, &str)] =
+    &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report"), ("touchup-python", "python")];
 
 /// Crates with several rooms, as other crates name them.
 const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];

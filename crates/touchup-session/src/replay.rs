@@ -192,6 +192,36 @@ pub fn each_sample(
     Ok(replayed)
 }
 
+/// As [`each_sample`], of messages that are there already.
+///
+/// - `messages`: of each kind in order of time.
+/// - `wrench_frame`: in which axes the wrenches are.
+///
+/// # Errors
+/// [`ReplayError::Setting`].
+pub fn each_sample_of(
+    messages: impl IntoIterator<Item = Message>,
+    wrench_frame: WrenchFrame,
+    placement: Option<Placement>,
+    sync: SyncParams,
+    at_message: &mut dyn FnMut(&Message),
+    mut each: impl FnMut(&Sample),
+) -> Result<Replayed, ReplayError> {
+    let mut sync = Synchroniser::new(sync)?;
+    placement.iter().try_for_each(Placement::check)?;
+    let mut replayed = Replayed::default();
+    for message in messages {
+        replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
+        at_message(&message);
+        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    }
+    sync.finish();
+    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
+    replayed.account_sync(&sync);
+    Ok(replayed)
+}
+
 impl Replayed {
     /// Adds the counts of the marker filter.
     fn account_markers(&mut self, filter: &MarkerFilter) {

@@ -44,6 +44,11 @@ pub(super) fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
     high - low
 }
 
+/// What `--json` prints of one mesh as `after`, as JSON.
+pub fn comparison_json(comparison: &Comparison) -> serde_json::Value {
+    serde_json::to_value(ComparisonReport::of(comparison)).expect("finite numbers and names alone cannot fail")
+}
+
 reported! {
     /// What `--json` prints of one mesh.
     struct ComparisonReport, fn of(comparison: &Comparison) {

@@ -9,7 +9,7 @@ mod record;
 mod remade;
 mod strokes;
 
-pub use outcome::{Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces};
+pub use outcome::{Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces, origins, sewn};
 pub use outliers::UncertaintySummary;
 pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};
 pub use remade::{EvidenceSource, RemakeError};

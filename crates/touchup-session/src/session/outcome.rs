@@ -80,7 +80,7 @@ pub struct Outcome {
 
 reported! {
     /// The patch in the report.
-    pub struct PatchSummary, fn of(patched: &Patched, seconds: f64) {
+    pub struct PatchSummary, pub fn of(patched: &Patched, seconds: f64) {
         /// how far the new faces may be from the surface that the touches show
         tolerance_mm: f64 = patched.tolerance * 1e3,
         /// faces of the scan that went
@@ -119,16 +119,20 @@ pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
 }
 
 /// For each vertex of a refined mesh its place in the scan, m in O; `None` where it is new.
-type Origins = Vec<Option<Point3<f64>>>;
+pub type Origins = Vec<Option<Point3<f64>>>;
 
-fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
+/// Where each vertex of a refined mesh was in the scan.
+pub fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
     (0..refined.vertex_slots()).map(|vertex| scan.positions().get(vertex).copied()).collect()
 }
 
 /// A remeshed part with the rest of its scan, and the places of its vertices in the scan.
 ///
 /// - `of_scan`: standard deviation of a vertex that was not touched, m.
-fn sewn(
+///
+/// # Errors
+/// [`MeshError::TornRim`], [`MeshError::TooMany`].
+pub fn sewn(
     part: Patched,
     origins: &[Option<Point3<f64>>],
     outside: &Outside,

@@ -1,0 +1,87 @@
+"""A scan and touches in, the refined mesh out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike, fspath
+from typing import Any, Literal, Union
+
+from . import _touchup
+from ._arrays import MeshArrays
+from .features import Features, features
+from .mesh import Mesh, MeshLike, Path, Unit
+from .recording import POSE_TOPIC, WRENCH_TOPIC, Recording, Samples
+from .scene import SceneLike, given
+from .touches import Touches
+
+ScanLike = Union[MeshLike, Path]
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """What came of a scan.
+
+    - `mesh`: with `sigma` and `support`, where the scene has a patch.
+    - `touches`: that features rest on.
+    - `summary`: as ``touchup refine --json`` has it: `samples`, `accepted`, `refused`, `contacts`, `moved_faces`, `friction`, `patch`,
+      `uncertainty`, `findings`.
+    """
+
+    mesh: Mesh
+    touches: Touches
+    summary: dict[str, Any]
+
+    @cached_property
+    def features(self) -> Features:
+        """Features of the mesh, measured by the touches; found at the first use."""
+        return features(self.mesh, self.touches)
+
+
+def refine(
+    scan: ScanLike,
+    recording: Recording | Samples | Path,
+    scene: SceneLike = None,
+    *,
+    unit: Unit | None = None,
+    pose_topic: str = POSE_TOPIC,
+    wrench_topic: str = WRENCH_TOPIC,
+    markers_topic: str | None = None,
+    stamp: Literal["header", "log"] = "header",
+    force: bool = False,
+) -> Refined:
+    """Refines a scan by touches, as ``touchup refine`` does.
+
+    - `scan`: a mesh, or the path of a file. `unit`: of its coordinates: ``"mm"`` for a file and ``"m"`` for arrays unless it is named.
+    - `recording`: poses and wrenches, `Samples` (whose wrenches turn with the stylus), or the path of a ROS 2 recording, of which the
+      topics and `stamp` are then read.
+    - `scene`: what differs from the usual cell. It must tell the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
+    - `force`: refines also where something of the recording is surely wrong.
+
+    Raises `TouchupError`, and warns with `TouchupWarning` of what is doubtful. The interpreter is free for other threads meanwhile.
+    """
+    scan_arrays, scan_file = scan_given(scan, unit)
+    poses = wrenches = file = None
+    frame: str = "sensor"
+    if isinstance(recording, Samples):
+        recording = recording.recording()
+    if isinstance(recording, Recording):
+        poses, wrenches, frame = recording._poses(), recording._wrenches(), recording.wrench_frame
+    else:
+        file = (fspath(recording), pose_topic, wrench_topic, markers_topic, stamp)
+    made = _touchup.refine(*given(scene), scan_arrays, scan_file, poses, wrenches, frame, file, force)
+    return refined(made)
+
+
+def scan_given(scan: ScanLike, unit: Unit | None) -> tuple[MeshArrays | None, tuple[str, str] | None]:
+    """Its arrays, or its path and unit."""
+    if isinstance(scan, (str, PathLike)):
+        return None, (fspath(scan), unit or "mm")
+    return Mesh.of(scan, unit or "m")._arrays(), None
+
+
+def refined(made: dict[str, Any]) -> Refined:
+    """What the native half made."""
+    mesh = Mesh(made["vertices"], made["faces"], made["sigma"], made["support"])
+    return Refined(mesh, Touches(**made["touches"]), json.loads(made["summary"]))

@@ -1,0 +1,308 @@
+//! The refinement sample by sample.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use nalgebra::Vector3;
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3::types::{PyDict, PyTuple};
+use touchup::cli::CliError;
+use touchup_core::haptic::{Case, Mismatch};
+use touchup_core::stylus::Sample;
+use touchup_session::live::LiveError;
+
+use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
+use crate::failure::{at_work, exception, usage};
+use crate::refining::{Refinement, ScanSource, reason_of};
+use crate::scenes::source;
+
+/// Samples that are taken between two looks at whether the user has interrupted.
+const CHUNK: usize = 4096;
+/// The number of a sample that was refused, where the others have that of their case.
+const REFUSED: u8 = 255;
+
+/// What one sample did.
+#[pyclass(frozen, module = "touchup")]
+pub struct Update {
+    update: touchup_core::haptic::Update,
+}
+
+#[pymethods]
+impl Update {
+    /// "free", "mesh_only", "surface_only" or "both": whether contact is expected and measured
+    #[getter]
+    fn case(&self) -> &'static str {
+        match self.update.case {
+            Case::Free => "free",
+            Case::MeshOnly => "mesh_only",
+            Case::SurfaceOnly => "surface_only",
+            Case::Both => "both",
+        }
+    }
+
+    /// The face that was touched; None where there is none within reach.
+    #[getter]
+    fn face(&self) -> Option<u32> {
+        self.update.mismatch.map(|mismatch| mismatch.face.0)
+    }
+
+    /// Signed distance of the ball's contact point from that face, m.
+    #[getter]
+    fn distance(&self) -> Option<f64> {
+        self.update.mismatch.map(|mismatch| mismatch.distance)
+    }
+
+    /// Force that the scan implies, N, in O.
+    #[getter]
+    fn expected_force(&self) -> Option<[f64; 3]> {
+        self.vector(|mismatch| mismatch.expected_force_o)
+    }
+
+    /// Measured less expected force, N, in O.
+    #[getter]
+    fn mismatch(&self) -> Option<[f64; 3]> {
+        self.vector(|mismatch| mismatch.linear)
+    }
+
+    /// Whether the mesh was moved.
+    #[getter]
+    fn moved(&self) -> bool {
+        self.update.fit.is_some()
+    }
+
+    fn __repr__(&self) -> String {
+        let face = self.face().map_or_else(|| "None".to_owned(), |face| face.to_string());
+        format!("Update(case={:?}, face={face}, moved={})", self.case(), if self.moved() { "True" } else { "False" })
+    }
+}
+
+impl Update {
+    fn vector(&self, of: fn(&Mismatch) -> Vector3<f64>) -> Option<[f64; 3]> {
+        self.update.mismatch.as_ref().map(|mismatch| of(mismatch).into())
+    }
+}
+
+/// `N` numbers of an array, a tuple or a list.
+fn numbers<const N: usize>(given: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; N]> {
+    if let Ok(array) = given.cast::<PyArray1<f64>>() {
+        let mut values = [0.0; N];
+        let is_whole = array.get_owned(N).is_none();
+        let mut known = (0..N).map(|at| array.get_owned(at));
+        if is_whole && values.iter_mut().all(|to| known.next().flatten().map(|x| *to = x).is_some()) {
+            return Ok(values);
+        }
+    } else if let Ok(tuple) = given.cast::<PyTuple>()
+        && tuple.len() == N
+    {
+        let mut values = [0.0; N];
+        for (to, item) in values.iter_mut().zip(tuple.iter_borrowed()) {
+            *to = item.extract()?;
+        }
+        return Ok(values);
+    }
+    let what = |_| exception(given.py(), usage(format!("{name} must be {N} numbers")));
+    given.extract().map_err(what)
+}
+
+/// Samples as arrays: stamps N, ns; positions N × 3, m; orientations N × 4, x y z w; forces and torques N × 3, N and N·m.
+type SampleArrays<'py> = (
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+);
+
+/// What became of many samples.
+#[derive(Default)]
+struct Pushed {
+    case: Vec<u8>,
+    face: Vec<i64>,
+    distance: Vec<f64>,
+    refused: std::collections::BTreeMap<&'static str, u64>,
+    first_refusal: Option<(usize, String)>,
+}
+
+impl Pushed {
+    fn push(&mut self, refinement: &mut Refinement, sample: &Sample) {
+        match refinement.engine.push(sample) {
+            Ok(update) => {
+                self.case.push(update.case as u8);
+                let mismatch = update.mismatch.map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance));
+                let (face, distance) = mismatch.unwrap_or((-1, f64::NAN));
+                self.face.push(face);
+                self.distance.push(distance);
+            }
+            Err(error) => {
+                *self.refused.entry(reason_of(&error)).or_default() += 1;
+                self.first_refusal.get_or_insert_with(|| (self.case.len(), error.to_string()));
+                self.case.push(REFUSED);
+                self.face.push(-1);
+                self.distance.push(f64::NAN);
+            }
+        }
+    }
+}
+
+/// Refines a scan sample by sample.
+#[pyclass(frozen, subclass, module = "touchup._touchup")]
+pub struct Refiner {
+    /// nothing once it was finished
+    refinement: Mutex<Option<Refinement>>,
+}
+
+impl Refiner {
+    /// Another thread may be at work, which needs the interpreter for nothing.
+    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Option<Refinement>> {
+        match self.refinement.try_lock() {
+            Ok(guard) => guard,
+            Err(_) => self.refinement.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
+        }
+    }
+
+    fn in_use<T>(&self, py: Python<'_>, with: impl FnOnce(&mut Refinement) -> PyResult<T>) -> PyResult<T> {
+        match self.locked(py).as_mut() {
+            Some(refinement) => with(refinement),
+            None => Err(exception(py, finished())),
+        }
+    }
+}
+
+#[cold]
+fn finished() -> CliError {
+    usage("the refiner is finished: make another one for more samples".to_owned())
+}
+
+/// All samples of the arrays.
+fn samples_of(arrays: &SampleArrays<'_>) -> Result<Vec<Sample>, CliError> {
+    let (stamps, position, orientation, force, torque) = arrays;
+    let position = rows::<3, f64>(position, "position")?;
+    let orientation = rows::<4, f64>(orientation, "orientation_xyzw")?;
+    let (force, torque) = (rows::<3, f64>(force, "force")?, rows::<3, f64>(torque, "torque")?);
+    let lengths = [
+        ("position", position.len()),
+        ("orientation_xyzw", orientation.len()),
+        ("force", force.len()),
+        ("torque", torque.len()),
+    ];
+    let stamps = stamps.as_array();
+    of_equal_length(("stamp_ns", stamps.len()), &lengths)?;
+    let of = |at: usize| {
+        sample(stamps[at], position[at], orientation[at], [force[at], torque[at]]).map_err(|error| CliError {
+            kind: "recording",
+            message: format!("sample {at}: {error}"),
+            hint: None,
+            exit_code: 3,
+        })
+    };
+    (0..stamps.len()).map(of).collect()
+}
+
+#[pymethods]
+impl Refiner {
+    #[new]
+    #[pyo3(signature = (scene_text, scene_path, scan, scan_file, frame))]
+    fn new(
+        py: Python<'_>,
+        scene_text: Option<String>,
+        scene_path: Option<std::path::PathBuf>,
+        scan: Option<MeshArrays<'_>>,
+        scan_file: Option<(std::path::PathBuf, String)>,
+        frame: &str,
+    ) -> PyResult<Self> {
+        let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
+        let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
+        let refinement = at_work(py, || Refinement::new(scan, &scene, frame))?;
+        Ok(Self { refinement: Mutex::new(Some(refinement)) })
+    }
+
+    /// Takes the next sample and moves the mesh by it.
+    ///
+    /// - `stamp_ns`: ns, after that of the sample before. `position`: (3,) m, centre of the ball in the frame of the scan.
+    /// - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m, zeros where it is left out.
+    ///
+    /// Each may be an array, a tuple or a list. Raises `TouchupError` for a sample that is not finite, absurd or not in order of time;
+    /// it changes nothing.
+    #[pyo3(signature = (stamp_ns, position, orientation_xyzw, force, torque = None))]
+    fn push(
+        &self,
+        py: Python<'_>,
+        stamp_ns: i64,
+        position: &Bound<'_, PyAny>,
+        orientation_xyzw: &Bound<'_, PyAny>,
+        force: &Bound<'_, PyAny>,
+        torque: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Update> {
+        let torque = torque.map_or(Ok([0.0; 3]), |torque| numbers(torque, "torque"))?;
+        let (position, force) = (numbers(position, "position")?, numbers(force, "force")?);
+        let turn = numbers(orientation_xyzw, "orientation_xyzw")?;
+        let sample = match sample(stamp_ns, position, turn, [force, torque]) {
+            Ok(sample) => sample,
+            Err(error) => return Err(exception(py, LiveError::Refine(error.into()).into())),
+        };
+        self.in_use(py, |refinement| match refinement.engine.push(&sample) {
+            Ok(update) => Ok(Update { update }),
+            Err(error) => Err(exception(py, error.into())),
+        })
+    }
+
+    /// Takes many samples, one after the other; a refused one is counted and changes nothing.
+    fn _push_many<'py>(&self, py: Python<'py>, samples: SampleArrays<'_>) -> PyResult<Bound<'py, PyDict>> {
+        let samples = samples_of(&samples).map_err(|error| exception(py, error))?;
+        let mut pushed = Pushed::default();
+        for chunk in samples.chunks(CHUNK) {
+            py.check_signals()?;
+            let (refinement, pushed) = (&self.refinement, &mut pushed);
+            let is_open = py.detach(move || {
+                let mut refinement = refinement.lock().unwrap_or_else(PoisonError::into_inner);
+                let Some(refinement) = refinement.as_mut() else { return false };
+                chunk.iter().for_each(|sample| pushed.push(refinement, sample));
+                true
+            });
+            if !is_open {
+                return Err(exception(py, finished()));
+            }
+        }
+        let into = PyDict::new(py);
+        into.set_item("case", PyArray1::from_vec(py, pushed.case))?;
+        into.set_item("face", PyArray1::from_vec(py, pushed.face))?;
+        into.set_item("distance", PyArray1::from_vec(py, pushed.distance))?;
+        into.set_item("refused", pushed.refused)?;
+        into.set_item("first_refusal", pushed.first_refusal)?;
+        Ok(into)
+    }
+
+    /// Seconds that the engine alone takes for these samples, without Python: for benches.
+    fn _rust_seconds(&self, py: Python<'_>, samples: SampleArrays<'_>) -> PyResult<f64> {
+        let samples = samples_of(&samples).map_err(|error| exception(py, error))?;
+        self.in_use(py, |refinement| {
+            let started = Instant::now();
+            for sample in &samples {
+                let _ = std::hint::black_box(refinement.engine.push(std::hint::black_box(sample)));
+            }
+            Ok(started.elapsed().as_secs_f64())
+        })
+    }
+
+    /// The mesh as the samples so far have moved it.
+    fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.engine.mesh())))?;
+        let into = PyDict::new(py);
+        compact.into_dict(&into)?;
+        Ok(into)
+    }
+
+    /// What became of the samples so far, by name.
+    fn _counts(&self, py: Python<'_>) -> PyResult<String> {
+        let counts = self.in_use(py, |refinement| Ok(*refinement.engine.refiner().counts()))?;
+        crate::arrays::json(&counts).map_err(|error| exception(py, error))
+    }
+
+    /// Reconstructs what was touched; the refiner takes no more samples.
+    fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
+        let refinement = self.locked(py).take().ok_or_else(|| exception(py, finished()))?;
+        at_work(py, || refinement.finish(force))?.into_dict(py)
+    }
+}

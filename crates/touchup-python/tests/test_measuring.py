@@ -1,0 +1,98 @@
+"""Features, comparison and alignment, against closed forms and trimesh."""
+
+import numpy as np
+import pytest
+import touchup
+import trimesh
+from conftest import plate
+
+
+def test_the_hole_of_a_ring_has_its_diameter(ring):
+    (hole,) = [of for of in touchup.features(ring, unit="mm")["features"] if of["kind"] == "hole"]
+    # 96 flats lie between the circle through the corners and the one inside
+    assert 8.0 * np.cos(np.pi / 96) - 1e-6 <= hole["diameter_mm"] <= 8.0 + 1e-6
+    assert hole["through"] and hole["depth_mm"] == pytest.approx(5.0, abs=1e-6)
+    assert abs(hole["axis"][2]) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_touches_measure_the_hole_better_than_the_scan(ring, refined):
+    holes = [of for of in refined.features["features"] if of["kind"] == "hole"]
+    assert holes and min(abs(hole["diameter_mm"] - 8.0) for hole in holes) < 0.05
+    assert holes[0]["fitted_to"] == "touches" and holes[0]["std"]["diameter_mm"] > 0
+
+
+def test_features_of_arrays_are_those_of_the_command(refined, tmp_path):
+    from conftest import done
+
+    refined.mesh.write(tmp_path / "refined.ply", "m")
+    refined.touches.write(tmp_path / "touches.csv")
+    flags = ("--mesh-unit", "m", "--touches", tmp_path / "touches.csv", "--json")
+    by_command = done("features", tmp_path / "refined.ply", *flags)
+    assert touchup.features(refined.mesh, touchup.Touches.read(tmp_path / "touches.csv")) == by_command
+
+
+def test_a_plate_above_another_deviates_by_its_height():
+    compared = touchup.compare(plate(z=0.1e-3), plate(), samples=2000)
+    assert np.allclose(compared.deviation, 0.1e-3, atol=1e-12)
+    assert compared.region()["mesh_to_truth"]["bias_mm"] == pytest.approx(0.1, abs=1e-9)
+    assert [region["region"] for region in compared.report["regions"]] == ["all"]
+
+
+def test_deviations_are_the_distances_of_trimesh(ring, refined):
+    compared = touchup.compare(refined.mesh, touchup.Mesh.of(ring, "mm"), samples=5000)
+    _, distance, _ = trimesh.proximity.closest_point_naive(ring, refined.mesh.vertices[::50] * 1e3)
+    assert np.allclose(np.abs(compared.deviation[::50]) * 1e3, distance, atol=1e-9)
+
+
+def test_the_comparison_is_that_of_the_command(ring, refined, tmp_path):
+    from conftest import done
+
+    truth = touchup.Mesh.of(ring, "mm")
+    truth.write(tmp_path / "truth.ply", "m")
+    refined.mesh.write(tmp_path / "refined.ply", "m")
+    flags = ("--mesh-unit", "m", "--truth-unit", "m", "--samples", 5000, "--tolerance-mm", 0.1, "--json")
+    by_command = done("compare", tmp_path / "refined.ply", tmp_path / "truth.ply", *flags)["after"]
+    assert touchup.compare(refined.mesh, truth, samples=5000, tolerance_mm=0.1).report == by_command
+
+
+def bracket():
+    """Two boxes that lie on no symmetry of one another, finely cut, m."""
+    boxes = [trimesh.creation.box((30, 20, 8)), trimesh.creation.box((6, 14, 10))]
+    boxes[1].apply_translation((8, 2, 11))
+    return trimesh.util.concatenate(boxes).subdivide().subdivide()
+
+
+def test_a_small_motion_is_taken_back():
+    part = bracket()
+    motion = trimesh.transformations.rotation_matrix(0.01, (1, 2, 3), (5, 0, 0))
+    motion[:3, 3] += (0.2, -0.1, 0.3)
+    moved = part.copy().apply_transform(motion)
+    found = touchup.align(moved, part, unit="mm")
+    back = np.linalg.inv(motion)
+    assert np.allclose(found.matrix[:3, :3], back[:3, :3], atol=1e-4)
+    assert np.allclose(found.apply(moved, "mm").vertices * 1e3, part.vertices, atol=0.02)
+    assert found.report["undetermined"] == 0
+
+
+def test_pairs_are_fitted_as_by_the_singular_value_decomposition():
+    random = np.random.default_rng(1)
+    before = random.normal(scale=0.05, size=(12, 3))
+    motion = trimesh.transformations.rotation_matrix(0.7, (1, -1, 2))[:3, :3]
+    after = before @ motion.T + (0.1, 0.2, 0.3) + random.normal(scale=1e-4, size=before.shape)
+    found = touchup.align_pairs(before, after)
+    u, _, vt = np.linalg.svd((before - before.mean(0)).T @ (after - after.mean(0)))
+    turn = vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
+    assert np.allclose(found.matrix[:3, :3], turn, atol=1e-9)
+    assert np.allclose(found.matrix[:3, 3], after.mean(0) - turn @ before.mean(0), atol=1e-9)
+    assert np.allclose(found.residuals, after - (before @ turn.T + found.matrix[:3, 3]), atol=1e-9)
+
+
+def test_a_ring_is_free_to_turn_and_the_error_says_about_which_axis(ring):
+    with pytest.raises(touchup.TouchupError, match="alignment|turn|symmetric") as refusal:
+        touchup.align(ring, ring, "features", unit="mm")
+    assert refusal.value.kind == "alignment"
+
+
+def test_a_method_that_is_none_is_refused():
+    with pytest.raises(touchup.TouchupError, match='must be "icp" or "features"'):
+        touchup.align(plate(), plate(), "magic")
