@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# One job of a sweep for each task of a Slurm array; begun again, a job that has its result returns at once:
+#
+#   touchup sweep plan grid.yaml --out jobs.jsonl
+#   sbatch --wait --array=0-$(($(wc -l < jobs.jsonl) - 1)) slurm.sh jobs.jsonl results
+#   touchup sweep table jobs.jsonl --results results --out table.csv
+#
+#SBATCH --job-name=touchup
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task=1
+#SBATCH --mem-per-cpu=500
+#SBATCH --requeue
+#SBATCH --output=slurm_%a.log
+exec touchup sweep run "$1" --job "$SLURM_ARRAY_TASK_ID" --results "$2"
