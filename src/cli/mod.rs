@@ -53,7 +53,6 @@ mod ur;
 mod web;
 
 pub use compare::comparison_json;
-pub use doctor::refuse_unsound;
 pub use error::CliError;
 pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
 pub use simulated_world::OffFactor;
