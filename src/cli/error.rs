@@ -26,6 +26,7 @@ use crate::scan::ScanError;
 use crate::scene::SceneError;
 use crate::session::OutcomeError;
 use crate::sim::SimError;
+use crate::sweep::{SweepError, WhatIfError};
 
 /// Losses of work that was done; empty: none.
 pub(super) type Losses = Vec<String>;
@@ -285,6 +286,32 @@ impl From<CalibrationError> for CliError {
             CalibrationError::Table(error) => error.into(),
             CalibrationError::PayloadOfArm(_) => Self::arm(error),
             error => Self::new(("calibration", 3), error, None),
+        }
+    }
+}
+
+impl From<SweepError> for CliError {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::Scene(error) => error.into(),
+            SweepError::Outcome(error) => error.into(),
+            SweepError::Features(error) => error.into(),
+            SweepError::Simulated(error) => error.into(),
+            SweepError::File(error @ FileError::Write { .. }) => Self::not_written(error),
+            SweepError::TooMany { .. } | SweepError::NoJob { .. } => Self::new(("usage", 2), &error, None),
+            error => Self::new(("sweep", 3), &error, Some(&error)),
+        }
+    }
+}
+
+impl From<WhatIfError> for CliError {
+    fn from(error: WhatIfError) -> Self {
+        match error {
+            WhatIfError::Result(error) => error.into(),
+            WhatIfError::Mesh(error) => error.into(),
+            WhatIfError::Compare(error) => error.into(),
+            WhatIfError::OtherScan { .. } => Self::new(("usage", 2), &error, None),
+            WhatIfError::Failed { .. } => Self::new(("sweep", 3), &error, None),
         }
     }
 }

@@ -11,6 +11,7 @@
 //! | [`calibration`] | tip, payload and place of the scan: from a recording to what is put into a scene |
 //! | [`input_check`] | what speaks against a recording on a scan |
 //! | [`refinement`] | a scan refined by a recording, from its first message to the result |
+//! | [`sweep`] | many refinements as jobs, and what moved between two of them |
 //! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -25,4 +26,5 @@ pub mod replay;
 pub mod scan;
 pub mod scene;
 pub mod session;
+pub mod sweep;
 pub mod threads;
