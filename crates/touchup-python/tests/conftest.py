@@ -1,6 +1,8 @@
 """Tests of the installed wheel: they run from outside of the source tree, so that no file beside it is imported.
 
     cd /tmp && python -m pytest …/crates/touchup-python/tests
+
+What is marked `full` belongs to `tests/all.sh --full` (TOUCHUP_FULL), and is not selected without.
 """
 
 import json
@@ -26,10 +28,11 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    if not os.environ.get("TOUCHUP_FULL"):
-        slow = [item for item in items if item.get_closest_marker("full")]
-        config.hook.pytest_deselected(items=slow)
-        items[:] = [item for item in items if item not in slow]
+    if os.environ.get("TOUCHUP_FULL"):
+        return
+    slow = [item for item in items if item.get_closest_marker("full")]
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if item not in slow]
 
 
 def run(*arguments, cwd=None):
