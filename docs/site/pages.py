@@ -34,7 +34,8 @@ def on_files(files, config):
             PLACES[path] = "index.md" if path == FRONT else page_of(path)
             files.append(File.generated(config, PLACES[path], content=as_page(path, text)))
         if path.endswith(".md"):
-            waiting += [target for target in links_of(path, text) if target not in PLACES and target not in waiting and (root / target).is_file()]
+            new = set(links_of(path, text)) - PLACES.keys() - set(waiting)
+            waiting += sorted(target for target in new if (root / target).is_file())
     return files
 
 

@@ -6,12 +6,14 @@
     ```
 """
 
+import collections
 import re
 from dataclasses import dataclass
 
 from conftest import ROOT
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "crates/touchup-python/README.md"]
+OTHERS = ["README.md", "crates/touchup-python/README.md", "examples/sweep/README.md"]
+PAGES = [*(ROOT / page for page in OTHERS), *sorted((ROOT / "docs").glob("*.md"))]
 
 # kind -> what is done with it; nothing is run of what a program prints, of formulas and drawings
 RUN, OUTPUT = {"sh", "console", "python", "yaml", "json", "rust"}, {"text"}
@@ -22,7 +24,6 @@ REASONS = {
     "needs a UR arm": r"rtde_receive|UrArm",
     "installs packages": r"\b(apt|pip|cargo) install|\bur setup",
     "changes the system": r"\bsudo ",
-    "is what the checks run": r"cargo (build|test)|tests/all\.sh",
     "takes minutes": r"touchup-report",
     "runs until it is stopped": r"--web\b|touchup node|ur_controller",
 }
@@ -85,3 +86,15 @@ def problem(block):
     if not re.search(REASONS[block.mark], block.code):
         return f'it has nothing that "{block.mark}" would be said of: its mark is not needed'
     return None
+
+
+def counts():
+    """How many blocks run, of each kind, and how many not, by reason: a line each."""
+    blocks = [block for page in PAGES for block in blocks_of(page)]
+    kinds = collections.Counter(block.kind for block in blocks if block.is_run)
+    reasons = collections.Counter(block.mark for block in blocks if block.mark)
+    return [
+        f"{sum(kinds.values())} blocks of the docs run: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()),
+        *(f"{n} not run: {reason}" for reason, n in reasons.most_common()),
+        f"{sum(block.kind in OUTPUT for block in blocks)} are what a program prints, or no code",
+    ]

@@ -16,6 +16,14 @@ from scipy.spatial.transform import Rotation, Slerp
 PAIRS = "scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm"
 
 
+GRID = """\
+scan: scan.ply
+scene: scene.yaml
+recordings: [monday.mcap, tuesday.mcap]
+keys: {contact.on_n: [0.3, 0.4]}
+"""
+
+
 def make_inputs(touchup, folder):
     """The part: a ring with a hole of 8 mm through 5 mm, and what a scanner, a stylus and a calibration make of it."""
     part = trimesh.creation.annulus(r_min=4.0, r_max=11.0, height=5.0, sections=96)
@@ -37,6 +45,11 @@ def make_inputs(touchup, folder):
     rows = [line for line in plate if line.startswith(("name,", "through-hole diameter"))]
     (folder / "bore.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     write_arm(folder / "arm.urdf")
+    # a sweep
+    for name in ("monday.mcap", "tuesday.mcap"):
+        shutil.copy(folder / "touch.mcap", folder / name)
+    (folder / "scene.yaml").write_text("tip: {radius_mm: 1.5}\n", encoding="utf-8")
+    (folder / "grid.yaml").write_text(GRID, encoding="utf-8")
     return samples
 
 

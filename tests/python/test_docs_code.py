@@ -1,10 +1,10 @@
 """Every block of README.md and docs/*.md runs, or says before it why not (doc_blocks.py).
 
-Blocks of one page run in order in one folder, which has the inputs that the pages name (doc_inputs.py): `sh` by bash, with `touchup` as it
-was built; `python` in one interpreter that has the wheel, TOUCHUP_PYTHON; a scene is checked by the wheel; `rust` belongs to cargo test.
+Blocks of one page run in order in one folder, which has the inputs that the pages name (doc_inputs.py): `sh` by bash, with `touchup`
+as it was built; `python` in one interpreter that has the wheel, TOUCHUP_PYTHON; a scene is checked by the wheel, a sweep is planned;
+`rust` belongs to cargo test.
 """
 
-import collections
 import json
 import os
 import re
@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 
 import doc_blocks
 import pytest
@@ -60,6 +61,8 @@ def folder(inputs, page, tmp_path):
     if page.name in inputs:
         shutil.rmtree(tmp_path / "my_recording")
         shutil.copytree(inputs[page.name], tmp_path, dirs_exist_ok=True)
+    if page.parent.name == "sweep":
+        shutil.copytree(page.parent, tmp_path, dirs_exist_ok=True)
     for name in ("config", "examples"):
         shutil.copytree(ROOT / name, tmp_path / name)
     (tmp_path / "docs").mkdir()
@@ -94,6 +97,10 @@ class Page:
         # what is for ROS is not for touchup
         if all(isinstance(of, dict) and "ros__parameters" in of for of in read.values()):
             return
+        if "keys" in read:
+            (self.folder / "block.yaml").write_text(block.code, encoding="utf-8")
+            self.sh(replace(block, kind="sh", code="touchup sweep plan block.yaml --out block.jsonl"))
+            return
         (self.folder / "block.yaml").write_text(block.code + ("" if "tip" in read else "tip: {radius_mm: 1.5}\n"), encoding="utf-8")
         self.execute(str(block), "import touchup\ntouchup.check_scene('block.yaml')\n")
 
@@ -127,6 +134,10 @@ class Page:
             self.errors.close()
 
 
+def name_of(page):
+    return page.relative_to(ROOT).as_posix()
+
+
 def flags_of(touchup, cache, words):
     """The flags of a verb, and of a verb below it, by its --help."""
     key = tuple(words)
@@ -144,7 +155,7 @@ def every_flag(touchup):
     return set().union(*(flags_of(touchup, {}, words) or set() for words in verbs + below))
 
 
-def test_each_block_runs_or_says_why_not(capsys):
+def test_each_block_runs_or_says_why_not():
     wrong = [f"{block}: {problem}" for block in ALL if (problem := doc_blocks.problem(block))]
     wrong += [
         f"{page.name}: a mark stands before no block"
@@ -152,17 +163,11 @@ def test_each_block_runs_or_says_why_not(capsys):
         if doc_blocks.marks_of(page) != sum(block.mark is not None for block in blocks)
     ]
     assert wrong == []
-    kinds = collections.Counter(block.kind for block in ALL if block.is_run)
-    reasons = collections.Counter(block.mark for block in ALL if block.mark)
-    lines = [f"{sum(kinds.values())} blocks of the docs run: " + ", ".join(f"{n} {kind}" for kind, n in kinds.most_common())]
-    lines += [f"{n} not run: {reason}" for reason, n in reasons.most_common()]
-    lines += [f"{sum(block.kind == 'text' for block in ALL)} are what a program prints, or no code"]
-    with capsys.disabled():
-        print("", *lines, sep="\n")
-    write_result("docs_code", "\n".join(["## Blocks of the documentation", "", *(f"- {line}" for line in lines)]) + "\n")
+    lines = [f"- {line}" for line in doc_blocks.counts()]
+    write_result("docs_code", "\n".join(["## Blocks of the documentation", "", *lines]) + "\n")
 
 
-@pytest.mark.parametrize("page", [page for page in BLOCKS if any(block.is_run for block in BLOCKS[page])], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if any(block.is_run for block in blocks)], ids=name_of)
 def test_the_blocks_of_a_page_run(page, folder, programs):
     with Page(folder, programs) as running:
         for block in BLOCKS[page]:
@@ -170,7 +175,7 @@ def test_the_blocks_of_a_page_run(page, folder, programs):
                 running.run(block)
 
 
-@pytest.mark.parametrize("page", list(BLOCKS), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", list(BLOCKS), ids=name_of)
 def test_the_flags_that_a_page_names_exist(page, touchup, every_flag):
     """Of commands in blocks, run or not, and in sentences."""
     text = page.read_text(encoding="utf-8")

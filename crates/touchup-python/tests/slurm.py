@@ -79,8 +79,8 @@ class Slurm:
         program = shutil.which(name, path=f"/usr/sbin:{os.environ['PATH']}")
         assert program, f"{name} is not installed (Debian: apt-get install slurm-wlm munge)"
         with open(self.folder / f"{name}.log", "w") as log:
-            command = [program, *arguments]
-            self.processes.append(subprocess.Popen(command, env=self.environment, stdout=log, stderr=subprocess.STDOUT, start_new_session=True))
+            options = {"env": self.environment, "stdout": log, "stderr": subprocess.STDOUT, "start_new_session": True}
+            self.processes.append(subprocess.Popen([program, *arguments], **options))
 
     def run(self, *command, **options):
         return subprocess.run([str(word) for word in command], env=self.environment, capture_output=True, text=True, **options)
