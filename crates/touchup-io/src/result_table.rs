@@ -76,6 +76,13 @@ impl ResultTable {
         Ok(table)
     }
 
+    /// A row of values by their names, each name once; what is nested is named as of features, and `Null` is no value.
+    pub fn add_json(&mut self, row: &[(String, Value)]) {
+        let mut cells = Vec::new();
+        row.iter().for_each(|(name, value)| flatten(name, value, &mut cells));
+        self.add_row(cells);
+    }
+
     fn add_row(&mut self, cells: Vec<(String, Cell)>) {
         for (name, cell) in cells {
             let at = self.columns.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {

@@ -14,10 +14,11 @@ use touchup::cli::CliError;
 use touchup_core::haptic::{Case, Mismatch};
 use touchup_core::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
+use touchup_session::refinement::{Refinement, reason_of_refusal};
 
 use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
 use crate::failure::{at_work, exception, usage};
-use crate::refining::{Refinement, ScanSource, reason_of};
+use crate::refining::{Reported, ScanSource, refinement};
 use crate::scenes::source;
 
 /// Samples that are taken between two looks at whether the user has interrupted.
@@ -158,7 +159,7 @@ impl Pushed {
 
     #[cold]
     fn refuse(&mut self, error: &LiveError) {
-        *self.refused.entry(reason_of(error)).or_default() += 1;
+        *self.refused.entry(reason_of_refusal(error)).or_default() += 1;
         self.first_refusal.get_or_insert_with(|| (self.case.len(), error.to_string()));
         self.append(REFUSED, None);
     }
@@ -245,7 +246,7 @@ impl Refiner {
     ) -> PyResult<Self> {
         let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
-        let refinement = at_work(py, || Refinement::new(scan, &scene, frame))?;
+        let refinement = at_work(py, || refinement(scan, &scene, frame))?;
         Ok(Self { refinement: Mutex::new(Some(refinement)) })
     }
 
@@ -339,6 +340,6 @@ impl Refiner {
     /// Reconstructs what was touched; the refiner takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
         let refinement = self.locked(py).take().ok_or_else(|| exception(py, finished()))?;
-        at_work(py, || refinement.finish(force))?.into_dict(py)
+        at_work(py, || Ok(Reported::from(refinement.finish(force)?)))?.into_dict(py)
     }
 }

@@ -29,6 +29,7 @@ __all__ = [
     "default_scene",
     "scene_parameters",
     "simulate",
+    "run_job",
 ]
 
 _Floats = NDArray[np.float64]
@@ -159,3 +160,11 @@ def simulate(
 def scene_parameters() -> str: ...
 def default_scene() -> str: ...
 def check_scene(text: str | None, path: _Path | None) -> None: ...
+def run_job(
+    jobs: _Path,
+    job: int,
+    results: _Path | None,
+    scan: bytes | None,
+    recording: bytes | None,
+    again: bool,
+) -> dict[str, Any]: ...
