@@ -64,7 +64,7 @@ python_environment() {
 }
 
 python_environments() {
-  python_environment "$venv" tests/python/requirements.txt "$requirements" && python_environment "$wheel_venv" "$wheel_crate/tests/requirements.txt" "$wheel_requirements"
+  python_environment "$venv" tests/python/requirements.txt docs/requirements.txt "$requirements" && python_environment "$wheel_venv" "$wheel_crate/tests/requirements.txt" "$wheel_requirements"
 }
 
 python_is_ready() { wait "$1" || { tail -n 5 "$logs/pip.log" >&2; return 1; }; }
