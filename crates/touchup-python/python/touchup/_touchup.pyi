@@ -29,7 +29,10 @@ __all__ = [
     "default_scene",
     "scene_parameters",
     "simulate",
-    "run_job",
+    "sweep_plan",
+    "sweep_run_job",
+    "sweep_tables",
+    "what_if",
 ]
 
 _Floats = NDArray[np.float64]
@@ -157,14 +160,12 @@ def simulate(
     scanner: str | None,
     sides: list[str],
 ) -> dict[str, Any]: ...
+def sweep_plan(grid: _Path, recordings: list[_Path], out: _Path) -> int: ...
+def sweep_run_job(
+    jobs: _Path, job: int, results: _Path, scan: bytes | None, recording: bytes | None, again: bool
+) -> str: ...
+def sweep_tables(jobs: _Path, results: _Path, with_features: bool) -> str: ...
+def what_if(a: _Path, b: _Path) -> dict[str, Any]: ...
 def scene_parameters() -> str: ...
 def default_scene() -> str: ...
 def check_scene(text: str | None, path: _Path | None) -> None: ...
-def run_job(
-    jobs: _Path,
-    job: int,
-    results: _Path | None,
-    scan: bytes | None,
-    recording: bytes | None,
-    again: bool,
-) -> dict[str, Any]: ...
