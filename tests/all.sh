@@ -64,7 +64,7 @@ python_environment() {
 }
 
 python_environments() {
-  python_environment "$venv" tests/python/requirements.txt "$requirements" && python_environment "$wheel_venv" "$wheel_crate/tests/requirements.txt" "$wheel_requirements"
+  python_environment "$venv" tests/python/requirements.txt docs/requirements.txt "$requirements" && python_environment "$wheel_venv" "$wheel_crate/tests/requirements.txt" "$wheel_requirements"
 }
 
 python_is_ready() { wait "$1" || { tail -n 5 "$logs/pip.log" >&2; return 1; }; }
@@ -212,8 +212,12 @@ stage "Fuzzing" fuzz_targets
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
 elif stage "Python packages" python_is_ready "$packages" && [ -e "$venv.made" ] && [ -e "$wheel_venv.made" ]; then
+  if stage "wheel" build_wheel; then
+    # what Python code of the documentation runs in
+    export TOUCHUP_PYTHON=$wheel_venv/bin/python
+    stage "tests of the wheel" wheel_tests
+  fi
   stage "Python tests" python_tests
-  stage "wheel" build_wheel && stage "tests of the wheel" wheel_tests
 else
   count=$(cat tests/python/test_*.py $wheel_crate/tests/test_*.py | grep -c '^ *def test_')
   skip "$count" "tests/python needs a Python environment in $venv (Debian: apt-get install python3-venv; and access to the packages of $requirements)"

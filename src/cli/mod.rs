@@ -58,6 +58,8 @@ pub use compare::comparison_json;
 pub use error::CliError;
 pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
 pub use simulated_world::OffFactor;
+pub use sweep::plan_sweep;
+pub use whatif::what_if_json;
 
 use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{

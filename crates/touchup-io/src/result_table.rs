@@ -10,7 +10,7 @@ use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::atomic::write_atomically;
 use crate::csv_line::csv_line;
@@ -39,6 +39,17 @@ enum Cell {
     Count(i64),
     Flag(bool),
     Text(String),
+}
+
+impl Cell {
+    fn to_json(&self) -> Value {
+        match self {
+            Self::Number(number) => Value::from(*number),
+            Self::Count(count) => Value::from(*count),
+            Self::Flag(flag) => Value::from(*flag),
+            Self::Text(text) => Value::from(text.clone()),
+        }
+    }
 }
 
 /// Columns of equal length; `None`: the row has no such value.
@@ -100,6 +111,19 @@ impl ResultTable {
     /// How many rows.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// Each row as an object of JSON, without what it has not.
+    pub fn json_rows(&self) -> Vec<Value> {
+        let mut rows = vec![Map::new(); self.rows];
+        for (name, column) in &self.columns {
+            for (row, cell) in rows.iter_mut().zip(column) {
+                if let Some(cell) = cell {
+                    row.insert(name.clone(), cell.to_json());
+                }
+            }
+        }
+        rows.into_iter().map(Value::Object).collect()
     }
 
     /// Writes it, as a whole or not at all: Parquet where the name ends so, else CSV.

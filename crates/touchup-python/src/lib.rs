@@ -12,7 +12,7 @@
 //! | `refiner` | the same sample by sample |
 //! | `measuring` | features, comparison, alignment |
 //! | `simulating` | scan and touches of a known part |
-//! | `sweeping` | one job of a sweep |
+//! | `sweeping` | jobs of a sweep, and what moved between two of them |
 //! | `scenes` | what the scene declares |
 //! | `command` | the command line |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
@@ -50,5 +50,5 @@ mod _touchup {
     #[pymodule_export]
     use crate::simulating::simulate;
     #[pymodule_export]
-    use crate::sweeping::run_job;
+    use crate::sweeping::{sweep_plan, sweep_run_job, sweep_tables, what_if};
 }

@@ -8,6 +8,7 @@ mod table;
 use clap::Subcommand;
 
 pub(super) use self::places::{check_table, results_of};
+pub use self::plan::plan_sweep;
 use super::{CliError, Losses};
 
 #[derive(Debug, Subcommand)]

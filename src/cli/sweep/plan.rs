@@ -24,22 +24,13 @@ pub(in crate::cli) struct PlanArguments {
 
 pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError> {
     let PlanArguments { grid, recordings, out } = arguments;
-    let folder = out.as_deref().map_or_else(PathBuf::new, JobsFile::folder);
-    if let Some(out) = out {
-        check_kept("GRID.yaml", grid, out)?;
-        recordings.iter().try_for_each(|recording| check_kept("RECORDING", recording, out))?;
-        check_place(out)?;
-    }
-    let plan = SweepPlan::read(grid, recordings, &folder)?;
     match out {
         Some(path) => {
-            let mut file = AtomicFile::create(path).map_err(not_written(path))?;
-            write_jobs(&plan, &mut file, path)?;
-            file.commit().map_err(not_written(path))?;
-            let jobs = counted(plan.count(), "job", "jobs");
+            let jobs = counted(plan_sweep(grid, recordings, path)?, "job", "jobs");
             print_result(&format!("wrote {0}: {jobs}; touchup sweep run {0}", path.display()))?;
         }
         None => {
+            let plan = SweepPlan::read(grid, recordings, Path::new(""))?;
             let mut out = stdout().lock();
             write_jobs(&plan, &mut out, Path::new("stdout"))?;
             match out.flush() {
@@ -49,6 +40,23 @@ pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError
         }
     }
     Ok(Losses::new())
+}
+
+/// Writes the jobs of a sweep into a file, as a whole or not at all, and returns how many there are.
+///
+/// - `grid`: what is swept; `recordings`: more of them, relative to the present folder.
+///
+/// # Errors
+/// As the command line has them.
+pub fn plan_sweep(grid: &Path, recordings: &[PathBuf], out: &Path) -> Result<u64, CliError> {
+    check_kept("GRID.yaml", grid, out)?;
+    recordings.iter().try_for_each(|recording| check_kept("RECORDING", recording, out))?;
+    check_place(out)?;
+    let plan = SweepPlan::read(grid, recordings, &JobsFile::folder(out))?;
+    let mut file = AtomicFile::create(out).map_err(not_written(out))?;
+    write_jobs(&plan, &mut file, out)?;
+    file.commit().map_err(not_written(out))?;
+    Ok(plan.count())
 }
 
 /// Stops where nobody reads any more.

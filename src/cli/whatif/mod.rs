@@ -10,6 +10,7 @@ use clap::Args;
 
 use self::page::page;
 use self::report::WhatIfReport;
+pub use self::report::what_if_json;
 use self::tables::{features_table, vertices_table, write_moved_mesh};
 use super::progress::WorkProgress;
 use super::sweep::{check_table, results_of};
@@ -57,7 +58,7 @@ pub(super) fn what_if(arguments: &WhatIfArguments) -> Result<Losses, CliError> {
     drop(reading);
     let comparing = WorkProgress::stage("compare");
     let found = WhatIf::of(&a, &b)?;
-    let report = WhatIfReport::of([&a, &b], names, &found);
+    let report = WhatIfReport::of([&a, &b], names.map(String::as_str), &found);
     drop(comparing);
     if let Some(path) = &arguments.out {
         let text = page(&report, [&a, &b], &found).map_err(not_written(path))?;

@@ -60,10 +60,10 @@ fn farthest(mesh: &TriMesh, displaced: &[Displacement]) -> Option<(VertexId, Dis
 }
 
 impl WhatIfReport {
-    pub fn of([a, b]: [&JobResult; 2], names: [&String; 2], found: &WhatIf) -> Self {
+    pub fn of([a, b]: [&JobResult; 2], names: [&str; 2], found: &WhatIf) -> Self {
         Self {
-            a: names[0].clone(),
-            b: names[1].clone(),
+            a: names[0].to_owned(),
+            b: names[1].to_owned(),
             keys: found.keys.clone(),
             k: K,
             vertices_a: MovedVertices::of(&a.mesh, &found.of_a),
@@ -82,6 +82,13 @@ impl WhatIfReport {
         };
         self.keys.iter().map(|(key, [a, b])| format!("{key}: {} → {}", shown(a), shown(b))).collect()
     }
+}
+
+/// What `touchup whatif --json` prints of two results.
+///
+/// - `names`: what they are called.
+pub fn what_if_json(results: [&JobResult; 2], names: [&str; 2], found: &WhatIf) -> Value {
+    serde_json::to_value(WhatIfReport::of(results, names, found)).unwrap_or_default()
 }
 
 /// Features that are named at most.

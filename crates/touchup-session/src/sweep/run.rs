@@ -103,7 +103,9 @@ impl JobRunner {
         let (scene, record) = self.scene(job)?;
         write_json(&claimed.path().join(RECORD), &record)?;
         let plain = |message: &str| {
-            let named = [(&scan.path, "the scan"), (&recording.path, "the recording")];
+            let mut named = [(&scan.path, "the scan"), (&recording.path, "the recording")];
+            // one may begin as the other does
+            named.sort_by_key(|(path, _)| std::cmp::Reverse(path.as_os_str().len()));
             named.iter().fold(message.to_owned(), |text, (path, name)| text.replace(&*path.to_string_lossy(), name))
         };
         match refined(job, &scan.path, &recording.path, scene, &claimed, &plain, at_each) {

@@ -166,7 +166,7 @@ pub struct NumberChange {
     pub change: f64,
     /// the larger ± of both; `None` where neither is known
     pub plus_minus: Option<f64>,
-    /// whether the change is more
+    /// whether the change is more; of a number without ± nothing is said
     pub moved: bool,
 }
 
@@ -256,7 +256,7 @@ fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     let changed = |name: &'static str, values: [Option<f64>; 2], change: f64| {
         let stds = [a, b].map(|one| one.std.get(name).copied());
         let plus_minus = stds.into_iter().flatten().reduce(f64::max).map(|std| k * std);
-        let moved = change.abs() > plus_minus.unwrap_or(0.0);
+        let moved = plus_minus.is_some_and(|known| change.abs() > known);
         NumberChange { name, a: values[0], b: values[1], change, plus_minus, moved }
     };
     let place = a.center_mm.zip(b.center_mm).map(|(p, q)| {
@@ -326,7 +326,7 @@ mod tests {
         let changed = changed_keys(&a, &b);
         let names: Vec<_> = changed.keys().map(String::as_str).collect();
         assert_eq!(names, ["guard", "guard.x", "tip.stiffness_n_per_mm"]);
-        assert_eq!(changed["tip.stiffness_n_per_mm"], [20.into(), 10.into()]);
+        assert_eq!(changed["tip.stiffness_n_per_mm"], [Value::from(20), Value::from(10)]);
         assert_ne!(a.id, b.id);
     }
 }
