@@ -195,7 +195,8 @@ pub fn align_pairs<'py>(
     let read = || {
         let (from, to) = (rows::<3, f64>(&source, "source_points")?, rows::<3, f64>(&target, "target_points")?);
         of_equal_length(("source_points", from.len()), &[("target_points", to.len())])?;
-        let pair = |(from, to): (&[f64; 3], &[f64; 3])| PointPair { from: (*from).into(), to: (*to).into(), sigma: None };
+        let pair =
+            |(from, to): (&[f64; 3], &[f64; 3])| PointPair { from: (*from).into(), to: (*to).into(), sigma: None };
         Ok(from.iter().zip(&*to).map(pair).collect())
     };
     let pairs: Vec<PointPair> = read().map_err(|error| exception(py, error))?;
