@@ -9,6 +9,7 @@ import calibration_recordings
 import numpy
 import trimesh
 from conftest import ROOT
+from part_of_recording import copy_part
 from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -47,7 +48,8 @@ def make_inputs(touchup, folder):
     write_arm(folder / "arm.urdf")
     # a sweep
     for name in ("monday.mcap", "tuesday.mcap"):
-        shutil.copy(folder / "touch.mcap", folder / name)
+        begin = samples[len(samples) // 2][0]
+        copy_part(folder / "touch.mcap", folder / name, lambda _, ns: begin <= ns < begin + 5 * 10**9)
     (folder / "scene.yaml").write_text("tip: {radius_mm: 1.5}\n", encoding="utf-8")
     (folder / "grid.yaml").write_text(GRID, encoding="utf-8")
     return samples

@@ -24,8 +24,8 @@ BLOCKS = {page: doc_blocks.blocks_of(page) for page in doc_blocks.PAGES}
 ALL = [block for blocks in BLOCKS.values() for block in blocks]
 PYTHON = os.environ.get("TOUCHUP_PYTHON", sys.executable)
 
-# flags of tests/all.sh, of touchup-report and of colcon
-OTHERS = {"--full", "--seeds", "--peers", "--base-paths"}
+# flags of tests/all.sh, touchup-report, colcon, touchup.ray, Slurm and Snakemake
+OTHERS = {"--full", "--seeds", "--peers", "--base-paths", "--address", "--max-retries", "--requeue", "--retries"}
 
 # reads blocks as lines of JSON, runs them in one namespace, and answers each with a line
 INTERPRETER = """
