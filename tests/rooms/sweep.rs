@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use touchup::io::recording::{Topics, write_recording};
 
 use crate::cli::{code, flat_scan, json as one_object, text, touch, touchup};
+use crate::full;
 
 /// A folder with a scan and a recording of [`touch`], and what is swept over them.
 struct Sweep {
@@ -453,6 +454,46 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     let same = touchup(&["whatif", "0", "0", "--jobs", &sweep.name("jobs.jsonl"), "--json"], "");
     assert_eq!(one_object(&same)["vertices_a"]["moved"], 0);
     assert_eq!(one_object(&same)["keys"], json!({}));
+}
+
+/// On the plate of the demo, told that the stylus is softer than it is, every touched surface comes out farther by the same bending: the top
+/// rises by it, holes and slot shrink and the boss grows by twice as much. What does not bend, the axes, stays.
+#[test]
+fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
+    if !full::is_full() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let keys = "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 15] }\n";
+    fs::write(at("grid.yaml"), format!("simulate: {{ part: plate, seeds: [1] }}\n{keys}")).unwrap();
+    let planned = touchup(&["sweep", "plan", &at("grid.yaml"), "--out", &at("jobs.jsonl")], "");
+    assert_eq!(code(&planned), 0, "{}", text(&planned.stderr));
+    assert_eq!(code(&touchup(&["sweep", "run", &at("jobs.jsonl")], "")), 0);
+    // the plan has the stiffnesses as they are listed
+    let report = one_object(&touchup(&["whatif", "0", "1", "--jobs", &at("jobs.jsonl"), "--json"], ""));
+    assert_eq!(report["keys"], json!({ "tip.stiffness_n_per_mm": [20, 15] }));
+    let features = report["features"].as_array().unwrap();
+    let number = |feature: &Value, name: &str| {
+        let numbers = feature["numbers"].as_array().unwrap();
+        numbers.iter().find(|number| number["name"] == name).cloned().unwrap()
+    };
+    let top =
+        features.iter().find(|one| one["kind"] == "plane" && one["center_mm"][2].as_f64().unwrap() > 11.9).unwrap();
+    let rise = number(top, "center_mm")["change"].as_f64().unwrap();
+    assert!(number(top, "center_mm")["moved"] == true && rise > 0.0, "{top}");
+    for (kind, name, sign) in [("hole", "diameter_mm", -2.0), ("slot", "width_mm", -2.0), ("boss", "diameter_mm", 2.0)]
+    {
+        for feature in features.iter().filter(|one| one["kind"] == kind) {
+            let size = number(feature, name);
+            let (change, known) = (size["change"].as_f64().unwrap(), size["plus_minus"].as_f64().unwrap());
+            assert!(
+                (change - sign * rise).abs() <= known && size["moved"] == true,
+                "{kind}: {change} for {rise} ± {known}"
+            );
+            assert_eq!(number(feature, "axis_deg")["moved"], false, "{feature}");
+        }
+    }
 }
 
 // ---- simulated --------------------------------------------------------------------------------------------------
