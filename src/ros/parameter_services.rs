@@ -156,7 +156,7 @@ fn describe(name: &str) -> messages::ParameterDescriptor {
             described.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];
         }
         Allowed::OneOf(_, words) => described.additional_constraints = format!("one of {}", words.join(", ")),
-        Allowed::Bool(_) | Allowed::String(_) => {}
+        Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => {}
     }
     described
 }

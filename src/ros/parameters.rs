@@ -6,6 +6,7 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::io::mesh_file::MeshUnit;
+use crate::io::recording::{LiveType, SampleKind};
 use crate::scene::nearest;
 use touchup_core::parameters::Value;
 
@@ -79,6 +80,8 @@ pub enum Allowed {
     Double(f64, f64, f64),
     /// any word
     String(&'static str),
+    /// a type of messages that give poses or wrenches; empty: that of who publishes them
+    SampleType(SampleKind),
     /// the default, and the words to choose from
     OneOf(&'static str, &'static [&'static str]),
 }
@@ -113,7 +116,7 @@ pub const KIND_NAMES: [&str; 10] =
 
 /// All parameters of the node, those of docs/ros.md and the one that every node has.
 pub const PARAMETERS: &[ParameterDescriptor] = {
-    use Allowed::{Bool, Double, OneOf, String};
+    use Allowed::{Bool, Double, OneOf, SampleType, String};
     const fn fixed(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
         ParameterDescriptor { name, allowed, settable: Settable::AtStart, description }
     }
@@ -129,6 +132,10 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
         fixed("object_frame", String("object"), "frame of the mesh"),
         fixed("tool_frame", String(""), "frame whose pose comes; empty: as source"),
+        fixed("pose_type", SampleType(SampleKind::Pose), "type of the poses; empty: as published"),
+        fixed("wrench_type", SampleType(SampleKind::Wrench), "type of the wrenches; empty: as published"),
+        fixed("pose_frame", String(""), "whose pose is taken from /tf; empty: it comes as a topic"),
+        fixed("base_frame", String("cell"), "in which that pose is, or one without a header"),
         live("view_rate_hz", Double(20.0, 0.1, 100.0), "tiles and tip markers"),
         live("features_rate_hz", Double(5.0, 0.1, 100.0), "features while they change"),
         live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
@@ -198,6 +205,14 @@ pub enum ParameterError {
         /// to choose from
         words: &'static [&'static str],
     },
+    /// no type that gives what is wanted
+    #[error("{name} is {why}")]
+    SampleType {
+        /// which one
+        name: &'static str,
+        /// what it is instead, and what can be read
+        why: String,
+    },
     /// only when the node starts
     #[error("{name} cannot be set while the node runs: start it again with -p {name}:={value}")]
     NotLive {
@@ -227,6 +242,7 @@ impl ParameterDescriptor {
             Allowed::Bool(on) => ParameterValue::Bool(on),
             Allowed::Double(number, ..) => ParameterValue::Double(number),
             Allowed::String(word) | Allowed::OneOf(word, _) => ParameterValue::String(word.to_owned()),
+            Allowed::SampleType(_) => ParameterValue::String(String::new()),
         }
     }
 
@@ -257,6 +273,10 @@ impl ParameterDescriptor {
             (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => within(name, *whole as f64, from, to),
             (Allowed::OneOf(_, words), ParameterValue::String(word)) if !words.contains(&word.as_str()) => {
                 Err(ParameterError::Word { name, value: word.clone(), words })
+            }
+            (Allowed::SampleType(kind), ParameterValue::String(type_name)) => {
+                let known = LiveType::of(kind, type_name);
+                known.map(|_| value.clone()).map_err(|why| ParameterError::SampleType { name, why })
             }
             (Allowed::Bool(_), ParameterValue::Bool(_))
             | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => Ok(value.clone()),

@@ -30,6 +30,9 @@ pub(crate) struct Setup {
     pub topics: Topics,
     pub source: &'static str,
     pub tool: String,
+    /// whose pose in `base_frame` is taken from transforms
+    pub pose_frame: Option<String>,
+    pub base_frame: String,
 }
 
 impl Setup {
@@ -51,6 +54,8 @@ impl Setup {
             "" => source.to_owned(),
             named => named.to_owned(),
         };
+        let pose_frame = Some(parameters.string("pose_frame").to_owned()).filter(|frame| !frame.is_empty());
+        let base_frame = parameters.string("base_frame").to_owned();
         let known = scene.patcher_params().and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         let replica = MeshReplica::new(clock.clone(), &mesh);
@@ -66,6 +71,8 @@ impl Setup {
             topics: Topics { pose: format!("/{source}/pose"), wrench: format!("/{source}/wrench"), markers: None },
             source,
             tool,
+            pose_frame,
+            base_frame,
         })
     }
 }
