@@ -11,9 +11,9 @@
 //! | [`touchup_core`] | the method: [`stylus`] [`mesh`] [`reconstruct`] [`haptic`] [`features`] [`conformity`] [`align`] [`compare`] [`calibrate`] [`diagnose`] [`probing::plan`] [`probing::arm`] [`probing::execute`]; frames and units |
 //! | [`touchup_sim`] | [`sim`]: known surfaces, a scanner, a stylus and an arm to test against |
 //! | [`touchup_io`] | [`io`]: mesh files, recordings, tables, pictures |
-//! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`calibration`], [`input_check`], [`live`], [`session`] |
+//! | [`touchup_session`] | [`clock`], [`threads`], [`scan`], [`scene`], [`replay`], [`refinement`], [`calibration`], [`input_check`], [`live`], [`session`], [`sweep`] |
 //! | `touchup-report` | a program of its own: error against run time, stability, and what each part costs |
-//! | this one | `inspection`: a part against its drawing; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
+//! | this one | `inspection`: a part against its drawing; `html`: text within pages; `ros`: the node (features `ros` and `r2r`); `ros2_control`: an arm behind it; `ur` (feature `ur`): a UR; [`cli`]: one file for each verb |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 /// The method as docs/method.md has it; its code is tested.
@@ -24,10 +24,13 @@ struct MethodPage;
 pub use touchup_core::{
     align, calibrate, compare, conformity, diagnose, features, form, haptic, mesh, probing, reconstruct, stylus,
 };
-pub use touchup_session::{calibration, clock, input_check, live, replay, scan, scene, session, threads};
+pub use touchup_session::{
+    calibration, clock, input_check, live, refinement, replay, scan, scene, session, sweep, threads,
+};
 pub use {touchup_io as io, touchup_sim as sim};
 
 pub mod cli;
+mod html;
 mod inspection;
 pub mod log_lines;
 #[cfg(any(feature = "ros", feature = "r2r"))]

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs every test: cargo test, a minute of fuzz/run, then tests/python against the binary that it built.
+# Runs every test: cargo test, a minute of fuzz/run, tests/python against the binary that it built, and those of the wheel
+# against the wheel in an environment of its own.
 #
 #   tests/all.sh [--full]      --full: also the slow proofs (more seeds, sweeps, judged cases, RViz, Fast DDS over networks of
 #                              its own); what they measured goes into docs/results.md, with date, commit and machine
@@ -11,12 +12,13 @@ set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
 is_full= ignored_too=()
-requirements=tests/python/requirements.txt
+requirements=tests/python/requirements.txt wheel_requirements=crates/touchup-python/tests/requirements.txt
 case "${1-}" in
   # property tests try the same cases in every run, here; others with --full
   "") export PROPTEST_RNG_SEED=1 ;;
   --full)
-    is_full=yes ignored_too=(--include-ignored) requirements=tests/python/requirements-full.txt
+    is_full=yes ignored_too=(--include-ignored)
+    requirements=tests/python/requirements-full.txt wheel_requirements=crates/touchup-python/tests/requirements-full.txt
     export TOUCHUP_FULL=1 PROPTEST_CASES=2560 PROPTEST_MAX_GLOBAL_REJECTS=10240
     ;;
   *) echo "usage: tests/all.sh [--full]" >&2; exit 2 ;;
@@ -26,9 +28,14 @@ target=${CARGO_TARGET_DIR:-target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
 logs=$target/test-logs
 venv=$target/python
+wheel_crate=crates/touchup-python wheel_venv=$target/wheel_python
+# what it may weigh, bytes
+wheel_limit=12000000
 passed=0 failed=0 skipped=0 left=0
 reasons=() stages=()
 features=() has_ur=
+# what has Rust tests: the Python module has none, and its features would be those of all
+workspace=(--workspace --exclude touchup-python)
 rm -rf "$logs" && mkdir -p "$logs/results" || exit 1
 # what a slow proof measured goes here as a file of Markdown
 [ -z "$is_full" ] || export TOUCHUP_RESULTS=$logs/results
@@ -41,16 +48,23 @@ stage() {
   local name=$1 begun=$SECONDS; shift
   echo "== $name"
   "$@"
+  local status=$?
   stages+=("$(printf '%-28s %4d s' "$name" $((SECONDS - begun)))")
+  return $status
 }
 
-# makes target/python, once for each state of the requirements
+# python_environment FOLDER REQUIREMENTS...: makes it, once for each state of the requirements
 python_environment() {
-  local wanted; wanted=$(cat tests/python/requirements.txt "$requirements" | cksum)
-  [ "$(cat "$venv.made" 2>/dev/null)" = "$wanted" ] && return 0
-  rm -rf "$venv" "$venv.made"
-  python3 -m venv "$venv" && "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$requirements" || return 1
-  echo "$wanted" > "$venv.made"
+  local folder=$1 wanted; shift
+  wanted=$(cat "$@" | cksum)
+  [ "$(cat "$folder.made" 2>/dev/null)" = "$wanted" ] && return 0
+  rm -rf "$folder" "$folder.made"
+  python3 -m venv "$folder" && "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${@/#/-r}" || return 1
+  echo "$wanted" > "$folder.made"
+}
+
+python_environments() {
+  python_environment "$venv" tests/python/requirements.txt docs/requirements.txt "$requirements" && python_environment "$wheel_venv" "$wheel_crate/tests/requirements.txt" "$wheel_requirements"
 }
 
 python_is_ready() { wait "$1" || { tail -n 5 "$logs/pip.log" >&2; return 1; }; }
@@ -89,7 +103,7 @@ for crate in io report session; do unoptimised+=(--config "profile.dev.package.t
 # what tests, then the program and the stand-in for a controller, which by then are all but built: the other way round one core
 # waits for the last crates of the program
 build_tests() {
-  cargo test --workspace --no-run "${features[@]}" "${programs[@]}" && cargo build "${features[@]}" --bins --examples || fail "the tests do not build"
+  cargo test "${workspace[@]}" --no-run "${features[@]}" "${programs[@]}" && cargo build "${features[@]}" --bins --examples || fail "the tests do not build"
 }
 
 # cargo_tests LOG ARGUMENT...
@@ -118,17 +132,41 @@ python_tests() {
     # of the Rust tests: with a UR arm, and the stand-in for its controller
     export TOUCHUP_UR_BIN=$target/debug/touchup TOUCHUP_UR_CONTROLLER=$target/debug/examples/ur_controller
   fi
-  local status summary line passed_here
   # two at a time, each file on one of them: many tests wait for a node, and each has a domain of its own
-  "$venv/bin/python" -m pytest tests/python --numprocesses 2 --dist loadfile -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --durations=20 \
-    --junitxml="$logs/python.xml" 2>&1 | tee "$logs/python.log"
+  counted_pytest python "$venv" "$PWD" tests/python --numprocesses 2 --dist loadfile --durations=20
+}
+
+# counted_pytest NAME ENVIRONMENT FOLDER ARGUMENT...: pytest of an environment, in a folder; its tests are counted
+counted_pytest() {
+  local name=$1 environment=$2 folder=$3 status summary line passed_here; shift 3
+  (cd "$folder" && "$environment/bin/python" -m pytest "$@" -rs --tb=short --no-header -o "cache_dir=$logs/pytest_cache" --junitxml="$logs/$name.xml") 2>&1 |
+    tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
-  summary=$(counted_by_pytest "$logs/python.xml") || { fail "pytest ended with $status, see $logs/python.log"; return; }
+  summary=$(counted_by_pytest "$logs/$name.xml") || { fail "pytest ended with $status, see $logs/$name.log"; return; }
   read -r passed_here <<<"$summary"
   passed=$((passed + passed_here))
   while read -r line; do skip 1 "${line#skipped }"; done < <(grep '^skipped ' <<<"$summary")
   while read -r line; do fail "${line#failed }"; done < <(grep '^failed ' <<<"$summary")
-  if [ "$status" -ne 0 ] && ! grep -q '^failed ' <<<"$summary"; then fail "pytest ended with $status, see $logs/python.log"; fi
+  if [ "$status" -ne 0 ] && ! grep -q '^failed ' <<<"$summary"; then fail "pytest ended with $status, see $logs/$name.log"; fi
+}
+
+# the wheel as it is handed out; its weight counts as a test
+build_wheel() {
+  local wheel weight
+  rm -rf "$target/wheel"
+  "$venv/bin/python" -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$target/wheel" "./$wheel_crate" || { fail "the wheel does not build"; return 1; }
+  wheel=$(echo "$target"/wheel/touchup-*.whl)
+  weight=$(stat -c %s "$wheel") || { fail "no wheel in $target/wheel"; return 1; }
+  echo "$(basename "$wheel"): $weight bytes of at most $wheel_limit"
+  if [ "$weight" -le "$wheel_limit" ]; then passed=$((passed + 1)); else fail "the wheel has $weight bytes, more than $wheel_limit"; fi
+  "$wheel_venv/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel" || { fail "the wheel does not install"; return 1; }
+}
+
+# from outside of the source tree, where no file of it is imported
+wheel_tests() {
+  local outside tests=$PWD/$wheel_crate/tests; outside=$(mktemp -d)
+  counted_pytest wheel "$wheel_venv" "$outside" "$tests" --numprocesses 2 --durations=10
+  rm -rf "$outside"
 }
 
 # a target counts as a test
@@ -159,24 +197,29 @@ PYTHON
 }
 
 # they arrive while the tests are built
-python_environment > "$logs/pip.log" 2>&1 &
+python_environments > "$logs/pip.log" 2>&1 &
 packages=$!
 ur_feature || skip "$(cat tests/ur/*.rs | grep -c '^#\[test\]')" "a UR arm needs the shared library of Python (Debian: apt-get install python3-dev)"
 web_feature || skip "$(cat src/ros/web/*.rs | grep -c '^ *#\[test\]')" "the operator's page is built by npm (Debian: apt-get install npm)"
 programs=(--test rooms --test report)
 [ -z "$has_ur" ] || programs+=(--test ur)
 stage "build of the Rust tests" build_tests
-stage "Rust tests" cargo_tests "$logs/rust.log" --workspace "${features[@]}" "${programs[@]}"
+stage "Rust tests" cargo_tests "$logs/rust.log" "${workspace[@]}" "${features[@]}" "${programs[@]}"
 # with them the node on r2r, of which without ROS only its parts can run; a program of fuzz/ would fuzz for ever
-stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" --workspace --exclude touchup-fuzz "${unoptimised[@]}" "${features[@]}" --features r2r-check --lib --bins
-stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" --workspace "${features[@]}" --doc
+stage "Rust unit tests" cargo_tests "$logs/rust_unit.log" "${workspace[@]}" --exclude touchup-fuzz "${unoptimised[@]}" "${features[@]}" --features r2r-check --lib --bins
+stage "Rust documentation tests" cargo_tests "$logs/rust_doc.log" "${workspace[@]}" "${features[@]}" --doc
 stage "Fuzzing" fuzz_targets
 if [ ! -x "$target/debug/touchup" ]; then
   fail "cargo test built no $target/debug/touchup"
-elif stage "Python packages" python_is_ready "$packages" && [ -e "$venv.made" ]; then
+elif stage "Python packages" python_is_ready "$packages" && [ -e "$venv.made" ] && [ -e "$wheel_venv.made" ]; then
+  if stage "wheel" build_wheel; then
+    # what Python code of the documentation runs in
+    export TOUCHUP_PYTHON=$wheel_venv/bin/python
+    stage "tests of the wheel" wheel_tests
+  fi
   stage "Python tests" python_tests
 else
-  count=$(cat tests/python/test_*.py | grep -c '^ *def test_')
+  count=$(cat tests/python/test_*.py $wheel_crate/tests/test_*.py | grep -c '^ *def test_')
   skip "$count" "tests/python needs a Python environment in $venv (Debian: apt-get install python3-venv; and access to the packages of $requirements)"
 fi
 

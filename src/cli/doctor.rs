@@ -15,6 +15,7 @@ use crate::diagnose::InputFinding;
 use crate::input_check::{InputCheck, check_input};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::StampSource;
+use crate::refinement::{self, InputNames};
 use crate::replay::{Recording, marker_filter};
 use crate::scan::read_scan;
 
@@ -68,9 +69,6 @@ impl fmt::Display for Diagnosis {
     }
 }
 
-/// Kind and exit code of an input that is not to be used.
-pub(super) const UNSOUND: (&str, u8) = ("input", 3);
-
 /// The command: replays, prints a line for each finding, and fails at a sure one.
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
@@ -91,15 +89,6 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
 /// Refuses an input of which something is surely wrong.
 ///
 /// - `scan`, `recording`: to be named.
-///
-/// # Errors
-/// The first that is.
-pub fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
-    match findings.iter().find(|finding| finding.is_sure) {
-        Some(finding) => {
-            let input = format!("{} on {}", recording.display(), scan.display());
-            Err(CliError::new(UNSOUND, format!("{input}: {finding}"), None))
-        }
-        None => Ok(()),
-    }
+pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
+    Ok(refinement::refuse_unsound(findings, InputNames { scan, recording })?)
 }

@@ -18,6 +18,7 @@ use crate::io::result_table::ResultTableError;
 use crate::io::touches_file::TouchesFileError;
 use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
 use crate::probing::plan::ExploreError;
+use crate::refinement::RefinementError;
 use crate::replay::ReplayError;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeError;
@@ -25,6 +26,7 @@ use crate::scan::ScanError;
 use crate::scene::SceneError;
 use crate::session::OutcomeError;
 use crate::sim::SimError;
+use crate::sweep::{SweepError, WhatIfError};
 
 /// Losses of work that was done; empty: none.
 pub(super) type Losses = Vec<String>;
@@ -44,6 +46,8 @@ pub struct CliError {
 
 /// Kind and exit code of a result that is not there.
 const NOT_WRITTEN: (&str, u8) = ("not_written", 1);
+/// Kind and exit code of an input that is not to be used.
+pub(super) const UNSOUND: (&str, u8) = ("input", 3);
 /// Kind and exit code of an arm that stopped.
 const STOPPED: (&str, u8) = ("stopped", 5);
 /// Kind and exit code of work with an arm that a signal ended.
@@ -282,6 +286,46 @@ impl From<CalibrationError> for CliError {
             CalibrationError::Table(error) => error.into(),
             CalibrationError::PayloadOfArm(_) => Self::arm(error),
             error => Self::new(("calibration", 3), error, None),
+        }
+    }
+}
+
+impl From<SweepError> for CliError {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::Scene(error) => error.into(),
+            SweepError::Outcome(error) => error.into(),
+            SweepError::Features(error) => error.into(),
+            SweepError::Simulated(error) => error.into(),
+            SweepError::File(error @ FileError::Write { .. }) => Self::not_written(error),
+            SweepError::TooMany { .. } | SweepError::NoJob { .. } => Self::new(("usage", 2), &error, None),
+            error => Self::new(("sweep", 3), &error, Some(&error)),
+        }
+    }
+}
+
+impl From<WhatIfError> for CliError {
+    fn from(error: WhatIfError) -> Self {
+        match error {
+            WhatIfError::Result(error) => error.into(),
+            WhatIfError::Mesh(error) => error.into(),
+            WhatIfError::Compare(error) => error.into(),
+            WhatIfError::OtherScan { .. } => Self::new(("usage", 2), &error, None),
+            WhatIfError::Failed { .. } => Self::new(("sweep", 3), &error, None),
+        }
+    }
+}
+
+impl From<RefinementError> for CliError {
+    fn from(error: RefinementError) -> Self {
+        match error {
+            RefinementError::Scene(error) => error.into(),
+            RefinementError::Setting(error) => error.into(),
+            RefinementError::Replay(error) => error.into(),
+            RefinementError::Live(error) => error.into(),
+            RefinementError::Outcome(error) => error.into(),
+            RefinementError::NothingMoves => Self::new(("usage", 2), error, None),
+            RefinementError::Unsound { .. } | RefinementError::NoSample { .. } => Self::new(UNSOUND, error, None),
         }
     }
 }

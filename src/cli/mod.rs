@@ -46,17 +46,20 @@ mod signals;
 mod simulate;
 mod simulated_world;
 mod step;
+mod sweep;
 mod told;
 #[cfg(feature = "ur")]
 mod ur;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod web;
+mod whatif;
 
 pub use compare::comparison_json;
-pub use doctor::refuse_unsound;
 pub use error::CliError;
 pub use simulate::{ScannerKind, Side, Simulation, SimulationSettings};
 pub use simulated_world::OffFactor;
+pub use sweep::plan_sweep;
+pub use whatif::what_if_json;
 
 use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{
@@ -136,6 +139,11 @@ enum Verb {
     Recover(recover::RecoverArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
+    /// Refines many recordings with many settings: plans jobs, runs them, and makes a table of what came of them
+    #[command(subcommand)]
+    Sweep(sweep::SweepArguments),
+    /// Says what moved between two results of a sweep by more than its ±
+    Whatif(whatif::WhatIfArguments),
     /// Measures error against run time, stability and cost on this machine: runs `touchup-report`, a program of its own
     #[command(disable_help_flag = true)]
     Report(report::HandedOver),
@@ -204,6 +212,8 @@ impl Verb {
             Self::Check(arguments) => check::check(arguments),
             Self::Recover(arguments) => recover::recover(arguments),
             Self::Simulate(arguments) => simulate::simulate(arguments),
+            Self::Sweep(arguments) => sweep::sweep(arguments),
+            Self::Whatif(arguments) => whatif::what_if(arguments),
             Self::Report(arguments) => report::report(arguments),
             #[cfg(any(feature = "ros", feature = "r2r"))]
             Self::Node(arguments) => node::node(arguments, _ros),

@@ -54,6 +54,12 @@ impl WorkProgress {
         }
     }
 
+    /// One step of a few is done.
+    pub fn step_now(&mut self) {
+        self.steps += 1;
+        self.look();
+    }
+
     fn look(&mut self) {
         if self.waiting && self.started.elapsed() > QUIET_FOR {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());

@@ -1,6 +1,5 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -11,7 +10,8 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use serde::Serialize;
 use tracing::{debug, warn};
 
-use super::doctor::{UNSOUND, refuse_unsound};
+use super::doctor::refuse_unsound;
+use super::error::UNSOUND;
 use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::page::{on_page, parameters_of};
@@ -25,20 +25,23 @@ use super::told::{ToldFlags, ToldNumbers};
 use super::web::WebFlags;
 use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
 use crate::diagnose::{InputFinding, InputMonitor};
-use crate::haptic::{RefineError, Refiner};
+use crate::haptic::Refiner;
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFileError, MeshUnit, check_target};
 use crate::io::recording::{StampSource, Topics};
-use crate::live::{Latencies, Quantiles};
+use crate::live::{Latencies, LiveError, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::reconstruct::CloudSummary;
-use crate::replay::{Recording, Replayed, each_sample, marker_filter};
+use crate::refinement::{JudgedReplay, NOTHING_MOVES, RefinementInput, SampleTaker, TouchSource, reason_of_refusal};
+use crate::replay::{Recording, Replayed, marker_filter};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeEnd;
 use crate::scan::{Scan, read_scan};
-use crate::scene::{CutScan, LeftOut, Memory, Mode, Scene, SceneCost};
-use crate::session::{Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, UncertaintySummary};
-use crate::stylus::{ContactEstimator, MarkerCounts, Sample};
+use crate::scene::{LeftOut, Memory, Mode, Scene, SceneCost};
+use crate::session::{
+    Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, StrokeReplay, UncertaintySummary,
+};
+use crate::stylus::{ContactSample, MarkerCounts, Sample};
 use crate::threads::Threads;
 
 #[derive(Clone, Debug, Default, Args)]
@@ -178,8 +181,6 @@ pub(super) struct Refined {
     pub losses: Losses,
 }
 
-const NOTHING_MOVES: &str = "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
-
 const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
 
 const NO_PATCH: &str =
@@ -213,18 +214,43 @@ impl Pushes {
         self.latencies.record(time);
         match pushed {
             Ok(()) => self.accepted += 1,
-            Err(error) => *self.refused.entry(reason_of(&error).to_owned()).or_default() += 1,
+            Err(error) => {
+                *self.refused.entry(reason_of_refusal(&LiveError::Refine(error)).to_owned()).or_default() += 1
+            }
         }
     }
 }
 
-/// Why the refiner did not take a sample. The synchroniser lets only checked samples out, in order of time, so that what
-/// is left here is a step whose result is no number.
-fn reason_of(error: &RefineError) -> &'static str {
-    match error {
-        RefineError::Sample(_) => "sample",
-        RefineError::Setting(_) | RefineError::Dynamics(_) => "dynamics",
-        RefineError::Mesh(_) | RefineError::NoSuchFace { .. } => "mesh",
+/// Gives samples to both rates, as the strokes of a session and the clock have them.
+struct RateTaker {
+    rates: Rates,
+    pushes: Pushes,
+    strokes: StrokeReplay,
+    /// samples of strokes that were taken out
+    taken_out: u64,
+    /// for the registration
+    contacts: Option<ContactPoints>,
+}
+
+impl SampleTaker for RateTaker {
+    fn take(&mut self, sample: &Sample) -> bool {
+        self.rates.change_strokes(&mut self.strokes, sample.stamp_ns);
+        if !self.strokes.takes(sample.stamp_ns) {
+            self.taken_out += 1;
+            return false;
+        }
+        self.pushes.push(&mut self.rates, sample);
+        true
+    }
+
+    fn refiner(&self) -> &Refiner {
+        self.rates.engine.refiner()
+    }
+
+    fn observe(&mut self, contact: &ContactSample) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.push(contact);
+        }
     }
 }
 
@@ -297,64 +323,33 @@ impl RefineArguments {
         self.check_out()?;
         let started = Instant::now();
         let Scan { mesh, repair, cloud } = read_scan(&self.scan, self.mesh_unit)?;
-        let CutScan { mesh, cut } = scene.cut(mesh)?;
-        let as_scanned = mesh.clone();
-        let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
-        let recording = Recording::open(&self.bag, self.recorded.layout(&scene), self.stamp)?;
-        let recording_frame = recording.wrench_frame;
-        let params = scene.refine_params(recording_frame).ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
-        let params = cut.refine_params(params);
-        let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
+        let input = RefinementInput::new(scene, mesh)?;
+        let markers = marker_filter(&input.scene, self.recorded.markers_topic.as_deref())?;
+        let recording = Recording::open(&self.bag, self.recorded.layout(&input.scene), self.stamp)?;
+        let settings = input.settings(recording.wrench_frame);
+        let (params, patch) = settings.ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
         require(patch.is_some() || !self.live, NO_PATCH)?;
-        let mut rates = Rates::new(mesh, params, patch, self.live)?;
+        let mut rates = Rates::new(input.scan.clone(), params, patch, self.live)?;
         if self.strokes.has_exchanges() {
             rates.engine.keep_strokes();
         }
         let load_s = started.elapsed().as_secs_f64();
-        let cost = self.cost(&scene, &rates, as_scanned.bytes() + cut.bytes());
+        let RefinementInput { scene, scan: as_scanned, cut } = &input;
+        let cost = self.cost(scene, &rates, as_scanned.bytes() + cut.bytes());
 
         let started = Instant::now();
-        let mut pushes = Pushes::default();
-        let mut strokes = self.strokes.replay();
-        let mut taken_out = 0;
-        let monitor = RefCell::new(InputMonitor::new(scene.input_monitor_params(recording_frame))?);
-        let mut contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        // an update that takes every sample for contact says nothing about contact
-        let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        let mut replayed = each_sample(
-            recording,
-            scene.placement(),
-            scene.sync_params(),
-            markers,
-            &mut || progress.step(),
-            &mut |message| monitor.borrow_mut().message(message),
-            |sample| {
-                rates.change_strokes(&mut strokes, sample.stamp_ns);
-                if !strokes.takes(sample.stamp_ns) {
-                    taken_out += 1;
-                    return;
-                }
-                pushes.push(&mut rates, sample);
-                let contact = match &mut observer {
-                    Some(observer) => observer.observe(sample).ok(),
-                    None => rates.engine.refiner().contact(),
-                };
-                let mut monitor = monitor.borrow_mut();
-                monitor.sample(sample);
-                if let Some(contact) = contact {
-                    monitor.contact(contact);
-                }
-                if let (Some(contacts), Some(contact)) = (&mut contacts, contact) {
-                    contacts.push(contact);
-                }
-            },
-        )?;
+        let contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
+        let mut taker =
+            RateTaker { rates, pushes: Pushes::default(), strokes: self.strokes.replay(), taken_out: 0, contacts };
+        let touches = TouchSource::Recorded { recording: Box::new(recording), markers: markers.map(Box::new) };
+        let judged = input.replay(touches, &params, &mut taker, &mut || progress.step())?;
+        let JudgedReplay { mut replayed, monitor } = judged;
+        let RateTaker { mut rates, mut pushes, mut strokes, taken_out, contacts } = taker;
         rates.change_strokes(&mut strokes, i64::MAX);
-        let monitor = monitor.into_inner();
-        let tree = FaceTree::new_by(&as_scanned, &Threads);
-        let findings = self.doubt(&monitor, &as_scanned, &tree, pushes.accepted)?;
-        let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(&as_scanned, &tree)));
+        let tree = FaceTree::new_by(as_scanned, &Threads);
+        let findings = self.doubt(&monitor, as_scanned, &tree, pushes.accepted)?;
+        let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(as_scanned, &tree)));
         drop(tree);
         let (mut ended, live) = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
@@ -373,8 +368,8 @@ impl RefineArguments {
             must_change: !self.force,
         };
         let outcome = match patcher {
-            Some(patcher) => places.write_patched(&as_scanned, patcher)?,
-            None => places.write_moved(&as_scanned, &ended.mesh())?,
+            Some(patcher) => places.write_patched(as_scanned, patcher)?,
+            None => places.write_moved(as_scanned, &ended.mesh())?,
         };
         drop(stage);
         let counts = ended.refiner.counts();

@@ -29,6 +29,16 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item in items if item not in slow]
 
 
+def pytest_terminal_summary(terminalreporter):
+    """Says how many blocks of the documentation ran, where they did."""
+    reports = [report for reports in terminalreporter.stats.values() for report in reports]
+    if any("test_docs_code.py" in getattr(report, "nodeid", "") for report in reports):
+        import doc_blocks
+
+        terminalreporter.section("blocks of the documentation")
+        terminalreporter.write("\n".join([*doc_blocks.counts(), ""]))
+
+
 def write_result(name, text):
     """Puts what a test measured where `tests/all.sh --full` makes docs/results.md of it."""
     if folder := os.environ.get("TOUCHUP_RESULTS"):

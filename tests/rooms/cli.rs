@@ -11,7 +11,7 @@ use serde_json::Value;
 use touchup::io::recording::{Topics, write_recording};
 use touchup::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
-fn touchup(arguments: &[&str], input: &str) -> Output {
+pub fn touchup(arguments: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_touchup"))
         .args(arguments)
         .env_remove("RUST_LOG")
@@ -25,11 +25,11 @@ fn touchup(arguments: &[&str], input: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-fn code(output: &Output) -> i32 {
+pub fn code(output: &Output) -> i32 {
     output.status.code().expect("no signal ended it")
 }
 
-fn text(bytes: &[u8]) -> &str {
+pub fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
@@ -100,7 +100,7 @@ impl Case {
 }
 
 /// A square of 20 mm at z = 0, one vertex each millimetre.
-fn flat_scan() -> String {
+pub fn flat_scan() -> String {
     let side = 2 * HALF + 1;
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
@@ -124,7 +124,7 @@ const SURFACE: f64 = 0.3e-3;
 const STIFFNESS: f64 = 20e3;
 
 /// One second: poses at 500 Hz, wrenches at 1 kHz. The wrench is in the axes of O, or of a stylus held at `rotation`.
-fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Message> {
+pub fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Message> {
     let mut messages = Vec::new();
     for tick in 0..=1000_i64 {
         let stamp_ns = 1_000_000_000 + tick * 1_000_000;
@@ -151,7 +151,7 @@ fn highest(path: &Path) -> f64 {
     mesh.positions().iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn json(output: &Output) -> Value {
+pub fn json(output: &Output) -> Value {
     let lines: Vec<_> = text(&output.stdout).lines().collect();
     assert_eq!(lines.len(), 1, "{lines:?}");
     serde_json::from_str(lines[0]).unwrap()

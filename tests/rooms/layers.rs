@@ -34,8 +34,11 @@ const MAY_USE: &[(&str, &str)] = &[
     ("scan", "mesh reconstruct io threads"),
     ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
     ("replay", "numeric stylus io scene"),
-    ("session", "clock numeric stylus mesh reconstruct haptic live features io scan replay"),
-    ("inspection", "numeric stylus mesh features conformity align compare io scan scene session"),
+    ("session", "clock numeric stylus mesh reconstruct haptic live features io threads scan replay"),
+    ("refinement", "stylus mesh reconstruct haptic live diagnose threads scene replay session"),
+    ("sweep", "stylus mesh features compare sim io threads scan scene replay session refinement"),
+    ("html", ""),
+    ("inspection", "html numeric stylus mesh features conformity align compare io scan scene session"),
     ("calibration", "stylus align calibrate execute io scene replay"),
     ("input_check", "stylus mesh diagnose threads scene replay"),
     (
@@ -44,7 +47,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "python",
-        "numeric parameters stylus mesh reconstruct haptic live features align sim compare diagnose io threads scan scene session replay",
+        "numeric parameters stylus mesh reconstruct haptic live features align sim compare diagnose io threads scan scene session replay refinement sweep",
     ),
     ("ur", "clock stylus plan arm"),
     (
@@ -56,7 +59,7 @@ const MAY_USE: &[(&str, &str)] = &[
     (
         "cli",
         "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
-         calibrate compare diagnose io threads scan scene session replay inspection input_check calibration ros \
+         calibrate compare diagnose io threads scan scene session replay refinement sweep html inspection input_check calibration ros \
          ros2_control ur",
     ),
 ];

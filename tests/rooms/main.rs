@@ -42,3 +42,4 @@ mod ros2_control;
 mod scene;
 mod sim;
 mod stylus;
+mod sweep;

@@ -8,6 +8,7 @@ use nalgebra::vector;
 use proptest::prelude::*;
 use touchup::haptic::{Along, ContactModel, DynamicsParams, RefineParams, RoiSize, StepRule, TipParams};
 use touchup::io::mesh_file::MeshUnit;
+use touchup::io::recording::TableColumns;
 use touchup::reconstruct::PatcherParams;
 use touchup::scene::{
     CompensationSection, GravityAxes, LeftOut, MarkersSection, Mode, PayloadSection, RobotSection, ScanToSpaceSection,
@@ -62,6 +63,7 @@ fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let outer = [
         "",
         "sync",
+        "columns",
         "markers",
         "scan_to_space",
         "compensation",
@@ -186,6 +188,7 @@ fn a_header_alone_takes_the_defaults() {
         let scene = Scene::from_yaml(&yaml).unwrap_or_else(|error| panic!("{name}: {error}"));
         let mut expected = Scene::default();
         match name.as_str() {
+            "columns" => expected.columns = Some(TableColumns::default()),
             "markers" => expected.markers = Some(MarkersSection::default()),
             "scan_to_space" => expected.scan_to_space = Some(ScanToSpaceSection::default()),
             "compensation" => expected.compensation = Some(CompensationSection::default()),
@@ -196,7 +199,7 @@ fn a_header_alone_takes_the_defaults() {
         assert_eq!(scene, expected, "{name}");
         sections += 1;
     }
-    assert_eq!(sections, 16);
+    assert_eq!(sections, 17);
     let inner = Scene::from_yaml("compensation:\n  payload:\n  bias:\n").unwrap().compensation.unwrap();
     assert_eq!((inner.payload, inner.bias), (Some(PayloadSection::default()), Some(SensorBias::default())));
 }

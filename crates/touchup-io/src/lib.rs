@@ -39,10 +39,12 @@ macro_rules! reported {
 }
 
 pub mod atomic;
+pub mod content_hash;
 mod csv_line;
 pub mod features_file;
 pub mod file_error;
 pub mod inspection_file;
+pub mod json_lines;
 pub mod machine;
 pub mod mesh_file;
 pub mod nominal_file;
@@ -52,11 +54,13 @@ pub mod png;
 pub mod probed_touches_file;
 pub mod qif_file;
 pub mod recording;
+pub mod result_folder;
 pub mod result_table;
 mod scalar;
 pub mod scan_folder;
 pub mod session_folder;
 pub mod static_poses;
 pub mod table;
+pub mod text_file;
 pub mod touches_file;
 pub mod urdf;

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use parquet::errors::ParquetError;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::atomic::write_atomically;
 use crate::csv_line::csv_line;
@@ -35,6 +35,17 @@ enum Cell {
     Count(i64),
     Flag(bool),
     Text(String),
+}
+
+impl Cell {
+    fn to_json(&self) -> Value {
+        match self {
+            Self::Number(number) => Value::from(*number),
+            Self::Count(count) => Value::from(*count),
+            Self::Flag(flag) => Value::from(*flag),
+            Self::Text(text) => Value::from(text.clone()),
+        }
+    }
 }
 
 /// Columns of equal length; `None`: the row has no such value.
@@ -72,6 +83,13 @@ impl ResultTable {
         Ok(table)
     }
 
+    /// A row of values by their names, each name once; what is nested is named as of features, and `Null` is no value.
+    pub fn add_json(&mut self, row: &[(String, Value)]) {
+        let mut cells = Vec::new();
+        row.iter().for_each(|(name, value)| flatten(name, value, &mut cells));
+        self.add_row(cells);
+    }
+
     fn add_row(&mut self, cells: Vec<(String, Cell)>) {
         for (name, cell) in cells {
             let at = self.columns.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
@@ -89,6 +107,19 @@ impl ResultTable {
     /// How many rows.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// Each row as an object of JSON, without what it has not.
+    pub fn json_rows(&self) -> Vec<Value> {
+        let mut rows = vec![Map::new(); self.rows];
+        for (name, column) in &self.columns {
+            for (row, cell) in rows.iter_mut().zip(column) {
+                if let Some(cell) = cell {
+                    row.insert(name.clone(), cell.to_json());
+                }
+            }
+        }
+        rows.into_iter().map(Value::Object).collect()
     }
 
     /// Writes it, as a whole or not at all: Parquet where the name ends so, else CSV.

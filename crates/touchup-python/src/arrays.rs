@@ -1,5 +1,7 @@
 //! Arrays of NumPy as meshes, messages and touches, and back.
 
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, Point3, Quaternion, Vector3};
 use numpy::ndarray::ArrayView2;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -22,25 +24,28 @@ pub type WrenchArrays<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray2<'py, 
 /// Vertices and faces as they are worked on.
 pub type MeshVecs = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
-/// The rows of an array of `N` columns.
+/// The rows of an array of `N` columns: as they lie in memory where they follow each other there, else a copy.
 ///
 /// # Errors
 /// Where it has another shape.
-pub fn rows<const N: usize, T: Element + Copy + Default>(
-    array: &PyReadonlyArray2<'_, T>,
+pub fn rows<'a, const N: usize, T: Element + Copy + Default>(
+    array: &'a PyReadonlyArray2<'_, T>,
     name: &str,
-) -> Result<Vec<[T; N]>, CliError> {
+) -> Result<Cow<'a, [[T; N]]>, CliError> {
     let view: ArrayView2<'_, T> = array.as_array();
     if view.ncols() != N {
         let [rows, columns] = [view.nrows(), view.ncols()];
         return Err(usage(format!("{name} is an array of shape ({rows}, {columns}); it must be (N, {N})")));
+    }
+    if let Ok(numbers) = array.as_slice() {
+        return Ok(Cow::Borrowed(numbers.as_chunks().0));
     }
     let row = |row: numpy::ndarray::ArrayView1<'_, T>| {
         let mut values = [T::default(); N];
         values.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         values
     };
-    Ok(view.rows().into_iter().map(row).collect())
+    Ok(Cow::Owned(view.rows().into_iter().map(row).collect()))
 }
 
 /// Refuses arrays of one table that differ in length.
@@ -62,8 +67,8 @@ pub fn of_equal_length(first: (&str, usize), others: &[(&str, usize)]) -> Result
 /// Where one has another shape.
 pub fn mesh_vecs((vertices, faces): &MeshArrays<'_>, name: &str) -> Result<MeshVecs, CliError> {
     let vertices = rows::<3, f64>(vertices, &format!("vertices of {name}"))?;
-    // a row is as large as a point, so the memory stays the same
-    Ok((vertices.into_iter().map(Point3::from).collect(), rows::<3, u32>(faces, &format!("faces of {name}"))?))
+    let faces = rows::<3, u32>(faces, &format!("faces of {name}"))?;
+    Ok((vertices.iter().copied().map(Point3::from).collect(), faces.into_owned()))
 }
 
 /// A mesh as it is, without repair, so that vertices keep their numbers.
@@ -170,13 +175,13 @@ pub fn messages(poses: &PoseArrays<'_>, wrenches: &WrenchArrays<'_>) -> Result<V
     of_equal_length(("pose_stamp_ns", poses.0.len()), &given)?;
     of_equal_length(("wrench_stamp_ns", wrenches.0.len()), &[("force", forces.len()), ("torque", torques.len())])?;
     let mut all = Vec::with_capacity(positions.len() + forces.len());
-    for ((&stamp_ns, position), xyzw) in poses.0.as_array().iter().zip(positions).zip(orientations) {
+    for ((&stamp_ns, position), xyzw) in poses.0.as_array().iter().zip(&*positions).zip(&*orientations) {
         let pose_ot =
-            pose(position, xyzw).ok_or_else(|| recording_error(no_rotation(stamp_ns, xyzw), "pose", all.len()))?;
+            pose(*position, *xyzw).ok_or_else(|| recording_error(no_rotation(stamp_ns, *xyzw), "pose", all.len()))?;
         all.push(Message::Pose(StampedPose { stamp_ns, pose_ot }));
     }
-    for ((&stamp_ns, force), torque) in wrenches.0.as_array().iter().zip(forces).zip(torques) {
-        let wrench = Wrench { force: force.into(), torque: torque.into() };
+    for ((&stamp_ns, force), torque) in wrenches.0.as_array().iter().zip(&*forces).zip(&*torques) {
+        let wrench = Wrench { force: (*force).into(), torque: (*torque).into() };
         all.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
     }
     // stable: of one stamp the pose stays first
@@ -266,7 +271,7 @@ pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>,
     let rejected: PyReadonlyArray1<'_, bool> = item("is_rejected")?.extract()?;
     let [centre, point, normal] = ["centre", "point", "normal"].map(|name| {
         let array: PyReadonlyArray2<'_, f64> = item(name)?.extract()?;
-        Ok::<_, PyErr>(rows::<3, f64>(&array, name))
+        Ok::<_, PyErr>(rows::<3, f64>(&array, name).map(Cow::into_owned))
     });
     let (centre, point, normal) = match (centre?, point?, normal?) {
         (Ok(centre), Ok(point), Ok(normal)) => (centre, point, normal),

@@ -12,6 +12,7 @@
 //! | `refiner` | the same sample by sample |
 //! | `measuring` | features, comparison, alignment |
 //! | `simulating` | scan and touches of a known part |
+//! | `sweeping` | jobs of a sweep, and what moved between two of them |
 //! | `scenes` | what the scene declares |
 //! | `command` | the command line |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
@@ -25,6 +26,7 @@ mod refiner;
 mod refining;
 mod scenes;
 mod simulating;
+mod sweeping;
 
 use pyo3::pymodule;
 
@@ -47,4 +49,6 @@ mod _touchup {
     use crate::scenes::{check_scene, default_scene, scene_parameters};
     #[pymodule_export]
     use crate::simulating::simulate;
+    #[pymodule_export]
+    use crate::sweeping::{sweep_plan, sweep_run_job, sweep_tables, what_if};
 }

@@ -195,9 +195,11 @@ pub fn align_pairs<'py>(
     let read = || {
         let (from, to) = (rows::<3, f64>(&source, "source_points")?, rows::<3, f64>(&target, "target_points")?);
         of_equal_length(("source_points", from.len()), &[("target_points", to.len())])?;
-        Ok(from.into_iter().zip(to).map(|(from, to)| PointPair { from: from.into(), to: to.into(), sigma: None }))
+        let pair =
+            |(from, to): (&[f64; 3], &[f64; 3])| PointPair { from: (*from).into(), to: (*to).into(), sigma: None };
+        Ok(from.iter().zip(&*to).map(pair).collect())
     };
-    let pairs: Vec<PointPair> = read().map_err(|error| exception(py, error))?.collect();
+    let pairs: Vec<PointPair> = read().map_err(|error| exception(py, error))?;
     let fit = at_work(py, || {
         fit_pairs(&pairs, &PairsParams::default()).map_err(|error| CliError {
             kind: "calibration",

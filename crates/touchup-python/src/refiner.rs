@@ -1,7 +1,8 @@
 //! The refinement sample by sample.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 use nalgebra::Vector3;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -10,16 +11,17 @@ use pyo3::sync::MutexExt;
 use pyo3::types::{PyDict, PyTuple};
 use touchup::cli::CliError;
 use touchup_core::haptic::{Case, Mismatch};
-use touchup_core::stylus::Sample;
+use touchup_core::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
+use touchup_session::refinement::{Refinement, reason_of_refusal};
 
 use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
 use crate::failure::{at_work, exception, usage};
-use crate::refining::{Refinement, ScanSource, reason_of};
+use crate::refining::{Reported, ScanSource, refinement};
 use crate::scenes::source;
 
 /// Samples that are taken between two looks at whether the user has interrupted.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 2048;
 /// The number of a sample that was refused, where the others have that of their case.
 const REFUSED: u8 = 255;
 
@@ -126,23 +128,39 @@ struct Pushed {
 }
 
 impl Pushed {
-    fn push(&mut self, refinement: &mut Refinement, sample: &Sample) {
-        match refinement.engine.push(sample) {
+    fn with_capacity(count: usize) -> Self {
+        let (case, face) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        Self { case, face, distance: Vec::with_capacity(count), ..Self::default() }
+    }
+
+    #[inline]
+    fn push(&mut self, refinement: &mut Refinement, sample: &Result<Sample, SampleError>) {
+        let updated = match sample {
+            Ok(sample) => refinement.engine.push(sample),
+            Err(error) => Err(LiveError::Refine((*error).into())),
+        };
+        match updated {
             Ok(update) => {
-                self.case.push(update.case as u8);
                 let mismatch = update.mismatch.map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance));
-                let (face, distance) = mismatch.unwrap_or((-1, f64::NAN));
-                self.face.push(face);
-                self.distance.push(distance);
+                self.append(update.case as u8, mismatch);
             }
-            Err(error) => {
-                *self.refused.entry(reason_of(&error)).or_default() += 1;
-                self.first_refusal.get_or_insert_with(|| (self.case.len(), error.to_string()));
-                self.case.push(REFUSED);
-                self.face.push(-1);
-                self.distance.push(f64::NAN);
-            }
+            Err(error) => self.refuse(&error),
         }
+    }
+
+    #[inline]
+    fn append(&mut self, case: u8, touched: Option<(i64, f64)>) {
+        let (face, distance) = touched.unwrap_or((-1, f64::NAN));
+        self.case.push(case);
+        self.face.push(face);
+        self.distance.push(distance);
+    }
+
+    #[cold]
+    fn refuse(&mut self, error: &LiveError) {
+        *self.refused.entry(reason_of_refusal(error)).or_default() += 1;
+        self.first_refusal.get_or_insert_with(|| (self.case.len(), error.to_string()));
+        self.append(REFUSED, None);
     }
 }
 
@@ -175,29 +193,42 @@ fn finished() -> CliError {
     usage("the refiner is finished: make another one for more samples".to_owned())
 }
 
-/// All samples of the arrays.
-fn samples_of(arrays: &SampleArrays<'_>) -> Result<Vec<Sample>, CliError> {
-    let (stamps, position, orientation, force, torque) = arrays;
-    let position = rows::<3, f64>(position, "position")?;
-    let orientation = rows::<4, f64>(orientation, "orientation_xyzw")?;
-    let (force, torque) = (rows::<3, f64>(force, "force")?, rows::<3, f64>(torque, "torque")?);
-    let lengths = [
-        ("position", position.len()),
-        ("orientation_xyzw", orientation.len()),
-        ("force", force.len()),
-        ("torque", torque.len()),
-    ];
-    let stamps = stamps.as_array();
-    of_equal_length(("stamp_ns", stamps.len()), &lengths)?;
-    let of = |at: usize| {
-        sample(stamps[at], position[at], orientation[at], [force[at], torque[at]]).map_err(|error| CliError {
-            kind: "recording",
-            message: format!("sample {at}: {error}"),
-            hint: None,
-            exit_code: 3,
-        })
-    };
-    (0..stamps.len()).map(of).collect()
+/// The rows of the arrays of samples, of equal length.
+struct SampleRows<'a> {
+    stamp_ns: Cow<'a, [i64]>,
+    position: Cow<'a, [[f64; 3]]>,
+    orientation: Cow<'a, [[f64; 4]]>,
+    force: Cow<'a, [[f64; 3]]>,
+    torque: Cow<'a, [[f64; 3]]>,
+}
+
+impl<'a> SampleRows<'a> {
+    fn of((stamps, position, orientation, force, torque): &'a SampleArrays<'_>) -> Result<Self, CliError> {
+        let stamp_ns = stamps.as_slice().map_or_else(|_| Cow::Owned(stamps.as_array().to_vec()), Cow::Borrowed);
+        let orientation = rows(orientation, "orientation_xyzw")?;
+        let (position, force, torque) = (rows(position, "position")?, rows(force, "force")?, rows(torque, "torque")?);
+        let lengths = [
+            ("position", position.len()),
+            ("orientation_xyzw", orientation.len()),
+            ("force", force.len()),
+            ("torque", torque.len()),
+        ];
+        of_equal_length(("stamp_ns", stamp_ns.len()), &lengths)?;
+        Ok(Self { stamp_ns, position, orientation, force, torque })
+    }
+
+    /// The samples of some rows; where one is none, why.
+    fn part(&self, rows: Range<usize>) -> impl ExactSizeIterator<Item = Result<Sample, SampleError>> {
+        let (position, orientation) = (&self.position[rows.clone()], &self.orientation[rows.clone()]);
+        let (force, torque) = (&self.force[rows.clone()], &self.torque[rows.clone()]);
+        self.stamp_ns[rows].iter().zip(position).zip(orientation).zip(force).zip(torque).map(
+            |((((stamp_ns, position), xyzw), force), torque)| sample(*stamp_ns, *position, *xyzw, [*force, *torque]),
+        )
+    }
+
+    fn len(&self) -> usize {
+        self.stamp_ns.len()
+    }
 }
 
 #[pymethods]
@@ -214,7 +245,7 @@ impl Refiner {
     ) -> PyResult<Self> {
         let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
-        let refinement = at_work(py, || Refinement::new(scan, &scene, frame))?;
+        let refinement = at_work(py, || refinement(scan, &scene, frame))?;
         Ok(Self { refinement: Mutex::new(Some(refinement)) })
     }
 
@@ -250,11 +281,15 @@ impl Refiner {
 
     /// Takes many samples, one after the other; a refused one is counted and changes nothing.
     fn _push_many<'py>(&self, py: Python<'py>, samples: SampleArrays<'_>) -> PyResult<Bound<'py, PyDict>> {
-        let samples = samples_of(&samples).map_err(|error| exception(py, error))?;
-        let mut pushed = Pushed::default();
-        for chunk in samples.chunks(CHUNK) {
+        let rows = SampleRows::of(&samples).map_err(|error| exception(py, error))?;
+        let mut pushed = Pushed::with_capacity(rows.len());
+        let mut chunk = Vec::with_capacity(CHUNK.min(rows.len()));
+        for begin in (0..rows.len()).step_by(CHUNK) {
             py.check_signals()?;
-            let (refinement, pushed) = (&self.refinement, &mut pushed);
+            // while the interpreter is held, so that no thread of it writes to the arrays
+            chunk.clear();
+            chunk.extend(rows.part(begin..rows.len().min(begin + CHUNK)));
+            let (refinement, pushed, chunk) = (&self.refinement, &mut pushed, &chunk);
             let is_open = py.detach(move || {
                 let mut refinement = refinement.lock().unwrap_or_else(PoisonError::into_inner);
                 let Some(refinement) = refinement.as_mut() else { return false };
@@ -274,15 +309,15 @@ impl Refiner {
         Ok(into)
     }
 
-    /// Seconds that the engine alone takes for these samples, without Python: for benches.
-    fn _rust_seconds(&self, py: Python<'_>, samples: SampleArrays<'_>) -> PyResult<f64> {
-        let samples = samples_of(&samples).map_err(|error| exception(py, error))?;
+    /// A loop of Rust over these samples, for benches to compare with; returns how many were taken.
+    fn _push_in_rust(&self, py: Python<'_>, samples: SampleArrays<'_>) -> PyResult<usize> {
+        let rows = SampleRows::of(&samples).map_err(|error| exception(py, error))?;
         self.in_use(py, |refinement| {
-            let started = Instant::now();
-            for sample in &samples {
-                let _ = std::hint::black_box(refinement.engine.push(std::hint::black_box(sample)));
-            }
-            Ok(started.elapsed().as_secs_f64())
+            let pushed = rows.part(0..rows.len()).filter(|sample| {
+                let Ok(sample) = sample else { return false };
+                std::hint::black_box(refinement.engine.push(std::hint::black_box(sample))).is_ok()
+            });
+            Ok(pushed.count())
         })
     }
 
@@ -303,6 +338,6 @@ impl Refiner {
     /// Reconstructs what was touched; the refiner takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
         let refinement = self.locked(py).take().ok_or_else(|| exception(py, finished()))?;
-        at_work(py, || refinement.finish(force))?.into_dict(py)
+        at_work(py, || Ok(Reported::from(refinement.finish(force)?)))?.into_dict(py)
     }
 }

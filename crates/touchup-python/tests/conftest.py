@@ -1,9 +1,12 @@
 """Tests of the installed wheel: they run from outside of the source tree, so that no file beside it is imported.
 
     cd /tmp && python -m pytest …/crates/touchup-python/tests
+
+What is marked `full` belongs to `tests/all.sh --full` (TOUCHUP_FULL), and is not selected without.
 """
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -19,8 +22,17 @@ RADIUS_MM = 1.5
 SCENE = {"tip": {"radius_mm": RADIUS_MM, "stiffness_n_per_mm": 20.0}, "scan": {"noise_mm": 0.1}}
 
 
-def pytest_configure():
+def pytest_configure(config):
+    config.addinivalue_line("markers", "full: a slow proof, for tests/all.sh --full")
     assert ROOT not in Path(touchup.__file__).resolve().parents, "install the wheel and run from another folder"
+
+
+def pytest_collection_modifyitems(config, items):
+    if os.environ.get("TOUCHUP_FULL"):
+        return
+    slow = [item for item in items if item.get_closest_marker("full")]
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if item not in slow]
 
 
 def run(*arguments, cwd=None):

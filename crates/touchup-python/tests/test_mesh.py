@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import touchup
 import trimesh
-from conftest import plate
+from conftest import SCENE, plate
 
 
 def test_arrays_of_the_right_type_are_shared_and_not_copied():
@@ -36,6 +36,21 @@ def test_an_object_with_triangles_as_open3d_has_them_is_a_mesh():
     vertices, faces = plate()
     mesh = touchup.Mesh.of(SimpleNamespace(vertices=Vector3dVector(vertices), triangles=Vector3dVector(faces)))
     assert np.array_equal(mesh.vertices, vertices) and np.array_equal(mesh.faces, faces)
+
+
+@pytest.mark.full
+def test_a_mesh_of_open3d_is_refined_and_comes_back(touched, refined):
+    import open3d
+
+    scan = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(touched.scan.vertices), open3d.utility.Vector3iVector(touched.scan.faces.astype(np.int32))
+    )
+    again = touchup.refine(scan, touched.recording, SCENE)
+    assert np.array_equal(again.mesh.vertices, refined.mesh.vertices) and np.array_equal(again.mesh.faces, refined.mesh.faces)
+    back = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(again.mesh.vertices), open3d.utility.Vector3iVector(again.mesh.faces.astype(np.int32))
+    )
+    assert back.get_surface_area() == pytest.approx(trimesh.Trimesh(again.mesh.vertices, again.mesh.faces, process=False).area, rel=1e-12)
 
 
 def test_trimesh_reads_what_is_written(tmp_path):

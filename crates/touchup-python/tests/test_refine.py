@@ -51,8 +51,11 @@ def test_a_flat_scan_comes_up_to_the_plane_that_was_touched():
     height = 0.2e-3
     refined = touchup.refine(plate(), slide(height), SCENE, force=True)
     is_touched = refined.mesh.support == touchup.TOUCHED
-    assert is_touched.sum() > 10
-    assert np.allclose(refined.mesh.vertices[is_touched, 2], height, atol=5e-6)
+    x, y, z = refined.mesh.vertices.T
+    # 10 mm of strokes each way; at their rim the surface bends down to the scan, and says how uncertain it is there
+    inside = is_touched & (np.abs(x - 0.01) < 0.0045) & (np.abs(y - 0.01) < 0.0045)
+    assert inside.sum() > 40 and np.allclose(z[inside], height, atol=5e-6)
+    assert (np.abs(z - height)[is_touched] < 2 * refined.mesh.sigma[is_touched]).all()
 
 
 def test_other_threads_run_while_a_scan_is_refined(touched):

@@ -38,7 +38,7 @@ def test_vectors_may_be_tuples_lists_and_arrays_of_any_kind(of):
 
 def test_a_plane_is_felt_where_the_ball_bends_towards_it():
     height, force, stiffness = 0.15e-3, 2.0, 2e4
-    refiner, updates = pushed_one_by_one(slide(height, count=4000, force=force, stiffness=stiffness))
+    refiner, updates = pushed_one_by_one(slide(height, count=16000, force=force, stiffness=stiffness))
     first = next(update for update in updates if update.case != "free")
     # the ball as its pose has it is lower than the real one, by what the tip bends
     assert first.distance == pytest.approx(height - force / stiffness, abs=1e-9)

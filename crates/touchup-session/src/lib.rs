@@ -10,6 +10,8 @@
 //! | [`replay`] | a recording from its first message to its last, as messages or as samples |
 //! | [`calibration`] | tip, payload and place of the scan: from a recording to what is put into a scene |
 //! | [`input_check`] | what speaks against a recording on a scan |
+//! | [`refinement`] | a scan refined by a recording, from its first message to the result |
+//! | [`sweep`] | many refinements as jobs, and what moved between two of them |
 //! | [`session`] | one run: its recording, its result, and the inputs that reproduce it |
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
@@ -19,8 +21,10 @@ pub mod calibration;
 pub mod clock;
 pub mod input_check;
 pub mod live;
+pub mod refinement;
 pub mod replay;
 pub mod scan;
 pub mod scene;
 pub mod session;
+pub mod sweep;
 pub mod threads;

@@ -1,7 +1,7 @@
 //! How drawing and part were brought into one frame.
 
 use super::decisions::shown;
-use super::html::{escaped, table};
+use crate::html::{escaped, table};
 use crate::io::inspection_file::{AlignmentRecord, InspectionRecord};
 
 /// The section; without an alignment what that means for positions.

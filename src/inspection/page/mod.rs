@@ -2,7 +2,6 @@
 
 mod alignment;
 mod decisions;
-mod html;
 mod input;
 mod picture;
 mod plots;
@@ -12,8 +11,8 @@ mod style;
 mod tolerance_bar;
 mod touches;
 
-use self::html::{css_string, escaped};
 pub(super) use self::input::ReportInput;
+use crate::html::{css_string, escaped};
 use crate::inspection::InspectionError;
 
 /// The whole page.

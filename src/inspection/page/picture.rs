@@ -6,10 +6,10 @@ use std::fmt::Write;
 use nalgebra::Point3;
 
 use super::decisions::{DecisionLook, look_of};
-use super::html::base64;
 use super::input::ReportInput;
 use crate::compare::{PartView, PicturePanel, PictureParams, Rgb, draw_part};
 use crate::conformity::Decision;
+use crate::html::base64;
 use crate::inspection::InspectionError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::read_vertex_columns;

@@ -1,9 +1,9 @@
 //! Head, verdict, form and relations, calibration, files, limits.
 
 use super::decisions::{in_words, shown};
-use super::html::{escaped, table};
 use super::input::ReportInput;
 use crate::conformity::{Decision, InspectedQuantity, MeasuredNumber};
+use crate::html::{escaped, table};
 use crate::inspection::calibration::CalibrationLine;
 use crate::inspection::measured::relation_number;
 use crate::inspection::words::first_few;

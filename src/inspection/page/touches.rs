@@ -1,9 +1,9 @@
 //! The touches behind each number.
 
 use super::decisions::in_words;
-use super::html::{escaped, table};
 use super::input::ReportInput;
 use super::plots::{force_plot, residual_plot};
+use crate::html::{escaped, table};
 use crate::inspection::evidence::{TouchEvidence, probed_behind, touch_evidence, widest_gap_deg};
 use crate::inspection::rows::Balloon;
 use crate::io::features_file::FeatureRecord;

@@ -118,6 +118,12 @@ refine.roi_mm mm - 0 1000
 
 /// Key, default, the words to choose from (`-`: any).
 const WORDS: &str = "
+columns.time - -
+columns.position - -
+columns.orientation - -
+columns.force - -
+columns.torque - -
+columns.wrench_axes pose pose,tip
 compensation.payload.gravity_axes object object,space
 tip.shape ball ball,flat,cone
 scan.file - -
@@ -141,8 +147,9 @@ refine.along - normal0,force
 ";
 
 /// The sections, and whether they are built in the default scene.
-const SECTIONS: [(&str, bool); 19] = [
+const SECTIONS: [(&str, bool); 20] = [
     ("sync", true),
+    ("columns", false),
     ("clock", true),
     ("markers", false),
     ("scan_to_space", false),

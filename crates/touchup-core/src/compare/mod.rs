@@ -8,6 +8,7 @@ mod colour;
 mod comparison;
 mod deviation;
 mod disagreement;
+mod displacement;
 mod lines;
 mod normals;
 mod picture;
@@ -23,6 +24,7 @@ pub use disagreement::{
     BadTouches, Class, ClassMap, Disagreement, DisagreementRegion, RefinedShape, RegionEvidence, RigidOffset, Scanner,
     VertexBasis, disagreement,
 };
+pub use displacement::{DisplacedFrom, Displacement, displacements_by_vertex, displacements_to_surface, moved_count};
 pub use lines::DrawnMesh;
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{PartView, Picture, PictureLabel, PicturePanel, PictureParams, draw_part, draw_picture};

@@ -6,6 +6,7 @@ scan's own frame is O; a pose maps the tip T (origin: centre of the ball; z: alo
 A wrench is what the part does to the stylus.
 """
 
+from . import sweep
 from ._touchup import TouchupError, TouchupWarning, Update
 from ._scene_keys import Scene
 from .align import Alignment, align, align_pairs
@@ -18,6 +19,7 @@ from .refiner import Event, Pushed, Refiner
 from .scene import check_scene, default_scene
 from .simulate import Simulated, simulate
 from .touches import Touches
+from .what_if import Moved, WhatIf, what_if
 
 __all__ = [
     "GUESSED",
@@ -29,6 +31,7 @@ __all__ = [
     "Event",
     "Mesh",
     "MeshLike",
+    "Moved",
     "Pushed",
     "Recording",
     "Refined",
@@ -40,6 +43,7 @@ __all__ = [
     "TouchupWarning",
     "Touches",
     "Update",
+    "WhatIf",
     "align",
     "align_pairs",
     "check_scene",
@@ -48,4 +52,6 @@ __all__ = [
     "features",
     "refine",
     "simulate",
+    "sweep",
+    "what_if",
 ]

@@ -33,6 +33,32 @@ class Sync(TypedDict, total=False):
     """How many messages of each stream are held. — [messages] 2 to 1e+06; default `4096`"""
 
 
+class Columns(TypedDict, total=False):
+    """The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their names in its first
+    line, each with its unit, as in x_mm or `x [mm]`. Not named: the usual names are looked for, and those of
+    RTDE."""
+
+    time: str
+    """The column of the time: s, ms, us or ns."""
+
+    position: list[str]
+    """Position of the tip, three columns: m, mm, um or inch."""
+
+    orientation: list[str]
+    """Its orientation: a quaternion x, y, z, w, or a rotation vector of three columns in rad or deg; left out
+    and not found: none, which a ball needs none of when the wrench is in the axes of the positions."""
+
+    force: list[str]
+    """Force of the part on the stylus, three columns: N or kN."""
+
+    torque: list[str]
+    """Its torque: Nm or Nmm; left out and not found: 0."""
+
+    wrench_axes: Literal["pose", "tip"]
+    """In whose axes force and torque are: those of the positions, or those of the tip, which the orientation
+    turns.; default `pose`"""
+
+
 class Clock(TypedDict, total=False):
     """Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and
     never applied unasked. It has no keys. Off: it is not estimated."""
@@ -563,6 +589,11 @@ class Scene(TypedDict, total=False):
     sync: Sync | Literal[False, "off"] | None
     """Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off: only messages of
     equal stamp pair."""
+
+    columns: Columns | Literal[False, "off"] | None
+    """The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their names in its first
+    line, each with its unit, as in x_mm or `x [mm]`. Not named: the usual names are looked for, and those of
+    RTDE."""
 
     clock: Clock | Literal[False, "off"] | None
     """Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and

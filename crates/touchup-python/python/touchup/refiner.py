@@ -58,11 +58,12 @@ class Event:
 class Refiner(_touchup.Refiner):
     """Refines a scan sample by sample.
 
-    >>> import touchup
-    >>> triangle = ([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]], [[0, 1, 2]])
-    >>> refiner = touchup.Refiner(triangle, {"tip": {"radius_mm": 1.0}})
-    >>> refiner.push(0, (0.003, 0.003, 0.001), (0, 0, 0, 1), (0, 0, 2.0)).case
-    'surface_only'
+    Examples:
+        >>> import touchup
+        >>> triangle = ([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]], [[0, 1, 2]])
+        >>> refiner = touchup.Refiner(triangle, {"tip": {"radius_mm": 1.0}})
+        >>> refiner.push(0, (0.003, 0.003, 0.001), (0, 0, 0, 1), (0, 0, 2.0)).case
+        'surface_only'
     """
 
     _touches = False

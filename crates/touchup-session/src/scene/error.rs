@@ -78,7 +78,7 @@ pub enum SceneError {
 const FOR_PROGRAMMERS: &str = ", set DuplicateKeyPolicy in Options if acceptable";
 
 /// One line with the place, and the nearest known key where one is misspelt.
-pub(super) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
+pub(crate) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     let plain = error.without_snippet();
     let hint = match plain {
         serde_saphyr::Error::SerdeUnknownField { field, expected, .. } => {

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub use arm_check::{CheckDoubt, CheckRecord, CheckRecordError, CheckStanding};
 pub use built::{Built, LeftOut, Memory, SceneCost};
 pub use edit::Setting;
-use error::yaml_error;
+pub(crate) use error::yaml_error;
 pub use error::{SceneError, nearest};
 pub use params::simulated_arm;
 pub use region::{CutScan, RegionCut};

@@ -9,7 +9,9 @@ mod record;
 mod remade;
 mod strokes;
 
-pub use outcome::{Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, found, moved_faces, origins, sewn};
+pub use outcome::{
+    Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, RefinedMesh, found, moved_faces, origins, sewn,
+};
 pub use outliers::UncertaintySummary;
 pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};
 pub use remade::{EvidenceSource, RemakeError};

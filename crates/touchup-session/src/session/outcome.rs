@@ -11,6 +11,7 @@ use tracing::{debug, warn};
 use super::outliers::UncertaintySummary;
 use crate::reported;
 use crate::scan::carried_over;
+use crate::threads::Threads;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
@@ -151,6 +152,98 @@ fn written_counts(mesh: &TriMesh) -> [usize; 2] {
     [(0..mesh.vertex_slots() as u32).filter(is_used).count(), mesh.face_count()]
 }
 
+/// A refined mesh before it is written, whole: with the rest of a scan of which a part was refined.
+#[derive(Debug)]
+pub struct RefinedMesh {
+    /// m, in O
+    pub mesh: TriMesh,
+    /// for each vertex its place in the scan
+    pub origins: Origins,
+    /// the support of each vertex; none without a patch
+    pub support: Vec<Support>,
+    /// standard deviation of each vertex along the normal, m; none without a patch or `uncertainty`
+    pub sigma: Vec<f64>,
+    /// columns of a file of it, in its units
+    pub columns: Vec<VertexColumn>,
+    /// the touches that features are measured by
+    pub touches: Vec<ProbedPoint>,
+    /// numbers
+    pub outcome: Outcome,
+}
+
+fn check_changed(must_change: bool, changed: usize) -> Result<(), OutcomeError> {
+    if must_change && changed == 0 { Err(OutcomeError::Unchanged) } else { Ok(()) }
+}
+
+impl RefinedMesh {
+    /// A mesh without patch.
+    ///
+    /// - `scan`: unrefined.
+    /// - `refined`: as the haptic update left it.
+    /// - `outside`: the rest of the scan.
+    /// - `must_change`: whether a result that is the scan is refused.
+    ///
+    /// # Errors
+    /// [`OutcomeError::Unchanged`], [`OutcomeError::Mesh`].
+    pub fn moved(
+        scan: &TriMesh,
+        refined: &TriMesh,
+        outside: Option<&Outside>,
+        must_change: bool,
+    ) -> Result<Self, OutcomeError> {
+        let moved_faces = moved_faces(scan, refined);
+        check_changed(must_change, moved_faces as usize)?;
+        let own = origins(scan, refined);
+        let (mesh, origins) = match outside {
+            Some(outside) => {
+                let sewn = outside.sew_to(refined)?;
+                let origins = sewn.column(&own, None);
+                (sewn.mesh, origins)
+            }
+            None => (refined.clone(), own),
+        };
+        let outcome = Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(&mesh) };
+        let (support, sigma, columns, touches) = Default::default();
+        Ok(Self { mesh, origins, support, sigma, columns, touches, outcome })
+    }
+
+    /// The touched part of the scan remeshed; arguments as of [`Self::moved`].
+    ///
+    /// # Errors
+    /// [`OutcomeError::Unchanged`], [`OutcomeError::Mesh`].
+    pub fn patched(
+        scan: &TriMesh,
+        mut patcher: Patcher,
+        outside: Option<&Outside>,
+        must_change: bool,
+    ) -> Result<Self, OutcomeError> {
+        let started = Instant::now();
+        patcher.flush();
+        let patched = patcher.patched(scan, &FaceTree::new_by(scan, &Threads))?;
+        check_changed(must_change, patched.removed_faces + patched.moved_vertices)?;
+        let build_s = started.elapsed().as_secs_f64();
+        debug!(open_squares = patched.open_squares, "patched");
+        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
+        let moved_faces = moved_faces(scan, &patched.mesh);
+        let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
+        let own = origins(scan, &patched.mesh);
+        let (patched, origins) = match outside {
+            Some(outside) => sewn(patched, &own, outside, of_scan)?,
+            None => (patched, own),
+        };
+        let columns = patched.columns().into_iter();
+        let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
+        let outcome = Outcome {
+            moved_faces,
+            patch: Some(PatchSummary::of(&patched, build_s)),
+            uncertainty,
+            counts: written_counts(&patched.mesh),
+        };
+        let Patched { mesh, support, sigma, .. } = patched;
+        Ok(Self { mesh, origins, support, sigma, columns, touches: patcher.probed().to_vec(), outcome })
+    }
+}
+
 impl OutcomePlaces<'_> {
     /// Writes a mesh without patch.
     ///
@@ -160,51 +253,26 @@ impl OutcomePlaces<'_> {
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
     pub fn write_moved(&self, scan: &TriMesh, refined: &TriMesh) -> Result<Outcome, OutcomeError> {
-        let moved_faces = moved_faces(scan, refined);
-        self.check_changed(moved_faces as usize)?;
-        let (sewn, own) = (self.outside.map(|outside| outside.sew_to(refined)).transpose()?, origins(scan, refined));
-        let (refined, origins) = match &sewn {
-            Some(sewn) => (&sewn.mesh, sewn.column(&own, None)),
-            None => (refined, own),
-        };
-        self.write_mesh(refined, &origins, Vec::new())?;
-        self.write_features(&[])?;
-        Ok(Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(refined) })
-    }
-
-    fn check_changed(&self, changed_faces: usize) -> Result<(), OutcomeError> {
-        if self.must_change && changed_faces == 0 { Err(OutcomeError::Unchanged) } else { Ok(()) }
+        self.write(RefinedMesh::moved(scan, refined, self.outside, self.must_change)?)
     }
 
     /// Remeshes the touched part of the scan and writes the result.
     ///
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
-    pub fn write_patched(&self, scan: &TriMesh, mut patcher: Patcher) -> Result<Outcome, OutcomeError> {
-        let started = Instant::now();
-        patcher.flush();
-        let patched = patcher.patched(scan, &FaceTree::new(scan))?;
-        self.check_changed(patched.removed_faces + patched.moved_vertices)?;
-        let build_s = started.elapsed().as_secs_f64();
-        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
-        let moved_faces = moved_faces(scan, &patched.mesh);
-        let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
-        let own = origins(scan, &patched.mesh);
-        let (patched, origins) = match self.outside {
-            Some(outside) => sewn(patched, &own, outside, of_scan)?,
-            None => (patched, own),
-        };
-        let columns = patched.columns().into_iter();
-        let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
-        self.write_mesh(&patched.mesh, &origins, columns)?;
-        debug!(open_squares = patched.open_squares, "patched");
-        self.write_features(patcher.probed())?;
-        Ok(Outcome {
-            moved_faces,
-            patch: Some(PatchSummary::of(&patched, build_s)),
-            uncertainty,
-            counts: written_counts(&patched.mesh),
-        })
+    pub fn write_patched(&self, scan: &TriMesh, patcher: Patcher) -> Result<Outcome, OutcomeError> {
+        self.write(RefinedMesh::patched(scan, patcher, self.outside, self.must_change)?)
+    }
+
+    /// Writes a result that is whole already.
+    ///
+    /// # Errors
+    /// [`OutcomeError`]; no file is left half written.
+    pub fn write(&self, refined: RefinedMesh) -> Result<Outcome, OutcomeError> {
+        let RefinedMesh { mesh, origins, columns, touches, outcome, .. } = refined;
+        self.write_mesh(&mesh, &origins, columns)?;
+        self.write_features(&touches)?;
+        Ok(outcome)
     }
 
     /// Writes the mesh with the colours and texture coordinates of the scan.

@@ -1,7 +1,7 @@
 //! Text within HTML.
 
 /// A text as HTML shows it, also within quoted attributes.
-pub(super) fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut html = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {
@@ -19,7 +19,7 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 /// A text as a string of CSS, which can end neither the string nor the style.
-pub(super) fn css_string(text: &str) -> String {
+pub(crate) fn css_string(text: &str) -> String {
     let letter = |letter: char| match letter {
         letter if letter.is_ascii_alphanumeric() || letter == ' ' => letter.to_string(),
         control if control.is_control() => " ".to_owned(),
@@ -29,7 +29,7 @@ pub(super) fn css_string(text: &str) -> String {
 }
 
 /// Bytes in letters, as an address of data has them (RFC 4648, 4).
-pub(super) fn base64(bytes: &[u8]) -> String {
+pub(crate) fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
@@ -46,7 +46,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
 /// A table with a head that printers repeat.
 ///
 /// - `rows`: cells that are HTML already.
-pub(super) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| {
         cells.map(|cell| format!("<{tag}>{cell}</{tag}>")).collect::<String>()
     };

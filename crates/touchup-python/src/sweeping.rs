@@ -1,0 +1,93 @@
+//! Jobs of a sweep, and what moved between two of them.
+
+use std::path::{Path, PathBuf};
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::json;
+use touchup::cli::{plan_sweep, what_if_json};
+use touchup_core::compare::Displacement;
+use touchup_session::sweep::{COVERAGE, GivenInput, JobResult, JobRunner, JobsFile, SweepTables, WhatIf, tables_of};
+
+use crate::arrays::{Compact, json as to_json};
+use crate::failure::at_work;
+use crate::files::set_columns;
+
+/// Writes the jobs of a sweep, and returns how many there are.
+#[pyfunction]
+pub fn sweep_plan(py: Python<'_>, grid: PathBuf, recordings: Vec<PathBuf>, out: PathBuf) -> PyResult<u64> {
+    at_work(py, || plan_sweep(&grid, &recordings, &out))
+}
+
+/// Runs one job, and returns what came of it as JSON.
+#[pyfunction]
+#[pyo3(signature = (jobs, job, results, scan, recording, again))]
+pub fn sweep_run_job(
+    py: Python<'_>,
+    jobs: PathBuf,
+    job: u64,
+    results: PathBuf,
+    scan: Option<&[u8]>,
+    recording: Option<&[u8]>,
+    again: bool,
+) -> PyResult<String> {
+    at_work(py, || {
+        let line = JobsFile::job(&jobs, job)?;
+        let runner = JobRunner::new(JobsFile::folder(&jobs), results);
+        let report = runner.run(&line, GivenInput { scan, recording }, again, &mut || {})?;
+        to_json(&json!({
+            "job": report.job,
+            "id": report.id,
+            "result": report.result,
+            "was_there": report.was_there,
+            "failed": report.failed,
+            "summary": report.summary,
+        }))
+    })
+}
+
+/// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of those without a result.
+#[pyfunction]
+pub fn sweep_tables(py: Python<'_>, jobs: PathBuf, results: PathBuf, with_features: bool) -> PyResult<String> {
+    at_work(py, || {
+        let SweepTables { jobs, features, missing, .. } = tables_of(&jobs, &results, with_features)?;
+        to_json(&json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing }))
+    })
+}
+
+/// What moved between the results in two folders: `report` as JSON, and of each mesh its arrays with `displacement` and `plus_minus` (V,) m.
+#[pyfunction]
+pub fn what_if<'py>(py: Python<'py>, a: PathBuf, b: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+    let (results, found, report) = at_work(py, || {
+        let results = [JobResult::read(&a)?, JobResult::read(&b)?];
+        let found = WhatIf::of(&results[0], &results[1])?;
+        let names = [shown(&a), shown(&b)];
+        let report = what_if_json([&results[0], &results[1]], [&names[0], &names[1]], &found);
+        Ok((results, found, to_json(&report)?))
+    })?;
+    let into = PyDict::new(py);
+    into.set_item("report", report)?;
+    into.set_item("a", moved_mesh(py, &results[0], &found.of_a)?)?;
+    into.set_item("b", moved_mesh(py, &results[1], found.of_b.as_ref().unwrap_or(&found.of_a))?)?;
+    Ok(into)
+}
+
+fn shown(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+fn moved_mesh<'py>(py: Python<'py>, result: &JobResult, displaced: &[Displacement]) -> PyResult<Bound<'py, PyDict>> {
+    let (into, compact) = (PyDict::new(py), Compact::of(&result.mesh));
+    let column = |of: fn(&Displacement) -> f64| {
+        let values: Vec<f64> = displaced.iter().map(of).collect();
+        compact.column(&values).map(|values| PyArray1::from_vec(py, values))
+    };
+    into.set_item("displacement", column(|one| one.distance))?;
+    into.set_item("plus_minus", column(|one| one.sigma.map_or(f64::NAN, |_| one.plus_minus(COVERAGE))))?;
+    let mesh = PyDict::new(py);
+    set_columns(&mesh, &compact, result.sigma.as_deref(), None)?;
+    compact.into_dict(&mesh)?;
+    into.set_item("mesh", mesh)?;
+    Ok(into)
+}

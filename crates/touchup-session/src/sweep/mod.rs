@@ -1,0 +1,26 @@
+//! Many refinements: the settings of a scene times recordings, each a job that gives the same bytes wherever it runs.
+//!
+//! [`SweepPlan`] makes jobs of a file, [`JobRunner`] runs one, [`tables_of`] makes a table of what came of all. A job is named by what it
+//! depends on: the content of scan and recording, the whole scene, and the version of touchup. So its result needs no more than a place
+//! with its name, and no engine has to remember what was done.
+
+mod base_scene;
+mod error;
+mod grid;
+mod job;
+mod plan;
+mod record;
+mod run;
+mod sampling;
+mod simulated;
+mod summary;
+mod table;
+mod what_if;
+
+pub use error::SweepError;
+pub use job::{Job, JobsFile, RecordedAs};
+pub use plan::{MOST_JOBS, SweepPlan};
+pub use record::{JobRecord, read_record};
+pub use run::{GivenInput, JobReport, JobRunner};
+pub use table::{SweepTables, tables_of};
+pub use what_if::{COVERAGE, FeatureChange, JobResult, NumberChange, WhatIf, WhatIfError, changed_keys};

@@ -1,0 +1,264 @@
+//! One job from its line to its folder.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::base_scene::{BaseScene, JobScene};
+use super::error::SweepError;
+use super::job::Job;
+use super::record::{JobRecord, RECORD};
+use super::summary::{JobSummary, RefinedJob};
+use crate::refinement::{InputNames, RefinementError, RefinementInput, TouchSource, refine};
+use crate::replay::{Recording, marker_filter};
+use crate::scan::read_scan;
+use crate::session::{OutcomeError, OutcomePlaces};
+use touchup_io::content_hash::{content_hash, hash_of};
+use touchup_io::features_file::read_features;
+use touchup_io::machine::VERSION;
+use touchup_io::result_folder::{Claim, ClaimedFolder, claim};
+use touchup_io::text_file::{TemporaryFile, read_text, write_text};
+
+pub(super) const SUMMARY: &str = "summary.json";
+pub(super) const FAILED: &str = "failed.json";
+pub(super) const MESH: &str = "refined.ply";
+pub(super) const FEATURES: &str = "features.json";
+
+/// Content of files that a process has already: then they are not read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GivenInput<'a> {
+    /// of the scan's file
+    pub scan: Option<&'a [u8]>,
+    /// of the recording's file
+    pub recording: Option<&'a [u8]>,
+}
+
+/// What there is of a job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobReport {
+    /// its number
+    pub job: u64,
+    /// its name
+    pub id: String,
+    /// folder of its result
+    pub result: PathBuf,
+    /// whether it was there before
+    pub was_there: bool,
+    /// why nothing came of it
+    pub failed: Option<String>,
+    /// summary.json; nothing where it failed
+    pub summary: Value,
+}
+
+/// Runs jobs of one plan into one folder.
+#[derive(Debug)]
+pub struct JobRunner {
+    folder: PathBuf,
+    results: PathBuf,
+    hashes: RefCell<BTreeMap<PathBuf, String>>,
+}
+
+/// A file of a job where it can be read.
+struct InputFile {
+    path: PathBuf,
+    /// removes one that was made of given bytes
+    _temporary: Option<TemporaryFile>,
+}
+
+impl JobRunner {
+    /// - `folder`: of the file of jobs.
+    /// - `results`: where each has a folder by its id; made where it is not there.
+    pub fn new(folder: PathBuf, results: PathBuf) -> Self {
+        Self { folder, results, hashes: RefCell::default() }
+    }
+
+    /// Runs a job; one whose result is there returns at once. A refinement that fails by its input is a result as well.
+    ///
+    /// - `again`: also where its result is there, which is replaced.
+    /// - `at_each`: called after each record, to show the progress.
+    ///
+    /// # Errors
+    /// [`SweepError`] for a job that cannot be run, or its result not be written: then there is none.
+    pub fn run(
+        &self,
+        job: &Job,
+        given: GivenInput<'_>,
+        again: bool,
+        at_each: &mut dyn FnMut(),
+    ) -> Result<JobReport, SweepError> {
+        if job.touchup != VERSION {
+            return Err(SweepError::OtherVersion { job: job.job, planned: job.touchup.clone(), own: VERSION });
+        }
+        if !is_id(&job.id) {
+            return Err(SweepError::OtherJob { job: job.job });
+        }
+        let claimed = match claim(&self.results, &job.id, again)? {
+            Claim::Done(result) => return report(job, result, true),
+            Claim::Ours(claimed) => claimed,
+        };
+        let scan = self.input("the scan", &job.scan, &job.scan_sha256, given.scan)?;
+        let recording = self.input("the recording", &job.recording, &job.recording_sha256, given.recording)?;
+        let (scene, record) = self.scene(job)?;
+        write_json(&claimed.path().join(RECORD), &record)?;
+        let plain = |message: &str| {
+            let mut named = [(&scan.path, "the scan"), (&recording.path, "the recording")];
+            // one may begin as the other does
+            named.sort_by_key(|(path, _)| std::cmp::Reverse(path.as_os_str().len()));
+            named.iter().fold(message.to_owned(), |text, (path, name)| text.replace(&*path.to_string_lossy(), name))
+        };
+        match refined(job, &scan.path, &recording.path, scene, &claimed, &plain, at_each) {
+            Ok(summary) => write_json(&claimed.path().join(SUMMARY), &summary)?,
+            Err(JobFailure::OfInput(why)) => {
+                write_json(&claimed.path().join(FAILED), &serde_json::json!({ "error": plain(&why) }))?;
+            }
+            Err(JobFailure::OfSystem(error)) => return Err(error),
+        }
+        report(job, claimed.publish(again)?, false)
+    }
+
+    /// A file of a job, of which the content is what was planned.
+    fn input(&self, what: &str, path: &Path, planned: &str, given: Option<&[u8]>) -> Result<InputFile, SweepError> {
+        let path = self.folder.join(path);
+        let found = match given {
+            Some(bytes) => hash_of(bytes),
+            None => self.hash(&path)?,
+        };
+        if found != planned {
+            let what = format!("{what} {}", path.display());
+            return Err(SweepError::Changed { what, found, planned: planned.to_owned() });
+        }
+        let Some(bytes) = given else { return Ok(InputFile { path, _temporary: None }) };
+        // readers look at the ending
+        let temporary = TemporaryFile::new(&path, bytes)?;
+        Ok(InputFile { path: temporary.path().to_owned(), _temporary: Some(temporary) })
+    }
+
+    /// Read once for all jobs.
+    fn hash(&self, path: &Path) -> Result<String, SweepError> {
+        if let Some(known) = self.hashes.borrow().get(path) {
+            return Ok(known.clone());
+        }
+        let hash = content_hash(path)?;
+        self.hashes.borrow_mut().insert(path.to_owned(), hash.clone());
+        Ok(hash)
+    }
+
+    /// The scene with the keys of the job, and what its result depends on.
+    fn scene(&self, job: &Job) -> Result<(JobScene, JobRecord), SweepError> {
+        let text = match &job.scene {
+            Some(path) => {
+                let path = self.folder.join(path);
+                let text = read_text(&path)?;
+                let (found, planned) = (hash_of(text.as_bytes()), job.scene_sha256.clone().unwrap_or_default());
+                if found != planned {
+                    let what = format!("the scene {}", path.display());
+                    return Err(SweepError::Changed { what, found, planned });
+                }
+                text
+            }
+            None => String::new(),
+        };
+        let other = SweepError::OtherJob { job: job.job };
+        let Ok(scene) = BaseScene::of(&text)?.with(&job.keys) else { return Err(other) };
+        let Job { scan_sha256, mesh_unit, recording_sha256, recorded, .. } = job;
+        let record = JobRecord::new(scan_sha256, *mesh_unit, recording_sha256, recorded, scene.whole.clone());
+        if record.id == job.id { Ok((scene, record)) } else { Err(other) }
+    }
+}
+
+/// It becomes the name of a folder.
+fn is_id(id: &str) -> bool {
+    id.len() == 32 && id.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// Why there is no mesh.
+enum JobFailure {
+    /// … which is so wherever it runs
+    OfInput(String),
+    /// … which another try may change
+    OfSystem(SweepError),
+}
+
+impl From<RefinementError> for JobFailure {
+    fn from(error: RefinementError) -> Self {
+        match error {
+            RefinementError::Outcome(error @ (OutcomeError::Unchanged | OutcomeError::Mesh(_))) => {
+                Self::OfInput(error.to_string())
+            }
+            RefinementError::Outcome(error) => Self::OfSystem(error.into()),
+            error => Self::OfInput(error.to_string()),
+        }
+    }
+}
+
+fn refined(
+    job: &Job,
+    scan: &Path,
+    recording: &Path,
+    JobScene { scene, .. }: JobScene,
+    claimed: &ClaimedFolder,
+    plain: &dyn Fn(&str) -> String,
+    at_each: &mut dyn FnMut(),
+) -> Result<JobSummary, JobFailure> {
+    let of_input = |error: &dyn std::fmt::Display| JobFailure::OfInput(error.to_string());
+    let mesh = read_scan(scan, job.mesh_unit).map_err(|error| of_input(&error))?.mesh;
+    let markers = marker_filter(&scene, job.recorded.markers_topic.as_deref()).map_err(|error| of_input(&error))?;
+    let stamps = job.recorded.stamps().map_err(JobFailure::OfInput)?;
+    let opened = Recording::open(recording, job.recorded.layout(&scene), stamps).map_err(|error| of_input(&error))?;
+    let input = RefinementInput::new(scene, mesh).map_err(|error| of_input(&error))?;
+    let touches = TouchSource::Recorded { recording: Box::new(opened), markers: markers.map(Box::new) };
+    let refined = refine(input, touches, InputNames { scan, recording }, false, at_each)?;
+    let said = RefinedJob::of(&refined, plain);
+    let [mesh, features] = [MESH, FEATURES].map(|name| claimed.path().join(name));
+    let places = OutcomePlaces {
+        mesh: &mesh,
+        unit: job.mesh_unit,
+        scan,
+        features: Some(&features),
+        touches: None,
+        outside: None,
+        must_change: true,
+    };
+    let outcome = places.write(refined.finished.mesh).map_err(|error| JobFailure::OfSystem(error.into()))?;
+    let count = read_features(&features).map_err(|error| JobFailure::OfSystem(error.into()))?.features.len();
+    Ok(JobSummary::of(&said, &outcome, count))
+}
+
+fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepError> {
+    // finite numbers and names alone cannot fail
+    let text = serde_json::to_string_pretty(value).unwrap_or_default();
+    Ok(write_text(path, &(text + "\n"))?)
+}
+
+/// What is in the folder of a result.
+fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, SweepError> {
+    let ResultFiles { failed, summary } = ResultFiles::read(&result)?;
+    Ok(JobReport { job: job.job, id: job.id.clone(), result, was_there, failed, summary })
+}
+
+/// Summary or failure of a job.
+pub(super) struct ResultFiles {
+    pub failed: Option<String>,
+    pub summary: Value,
+}
+
+impl ResultFiles {
+    /// # Errors
+    /// [`SweepError::NoResult`]
+    pub fn read(result: &Path) -> Result<Self, SweepError> {
+        let read = |name: &str| {
+            let path = result.join(name);
+            let refused = |why: String| SweepError::NoResult { path: path.clone(), why };
+            let text = read_text(&path).map_err(|error| refused(error.to_string()))?;
+            serde_json::from_str::<Value>(&text).map_err(|error| refused(error.to_string()))
+        };
+        if result.join(FAILED).exists() {
+            let failed = read(FAILED)?;
+            let why = failed.get("error").and_then(Value::as_str).unwrap_or("it does not say why");
+            return Ok(Self { failed: Some(why.to_owned()), summary: Value::Null });
+        }
+        Ok(Self { failed: None, summary: read(SUMMARY)? })
+    }
+}
