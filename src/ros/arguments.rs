@@ -224,7 +224,7 @@ impl NodeConfig {
     /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or transforms.
     pub fn heard_topics(&self) -> [&'static str; 2] {
         let [wrench, pose] = self.sample_topics();
-        [wrench, if self.parameters.string("pose_frame").is_empty() { pose } else { "/tf" }]
+        [wrench, if self.parameters.pose_frames().is_none() { pose } else { "/tf" }]
     }
 
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {

@@ -110,6 +110,9 @@ pub struct ParameterDescriptor {
     pub description: &'static str,
 }
 
+/// The frame of poses that name none.
+pub const CELL_FRAME: &str = "cell";
+
 /// Names of the kinds of features by their numbers in messages.
 pub const KIND_NAMES: [&str; 10] =
     ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch"];
@@ -134,8 +137,7 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed("tool_frame", String(""), "frame whose pose comes; empty: as source"),
         fixed("pose_type", SampleType(SampleKind::Pose), "type of the poses; empty: as published"),
         fixed("wrench_type", SampleType(SampleKind::Wrench), "type of the wrenches; empty: as published"),
-        fixed("pose_frame", String(""), "whose pose is taken from /tf; empty: it comes as a topic"),
-        fixed("base_frame", String("cell"), "in which that pose is, or one without a header"),
+        fixed("pose_frame", String(""), "whose pose is taken from /tf, as tool0 or tool0 in base; empty: of a topic"),
         live("view_rate_hz", Double(20.0, 0.1, 100.0), "tiles and tip markers"),
         live("features_rate_hz", Double(5.0, 0.1, 100.0), "features while they change"),
         live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
@@ -346,6 +348,13 @@ impl Parameters {
     /// One that is a word; empty for a name that is none.
     pub fn string(&self, name: &str) -> &str {
         if let Some(ParameterValue::String(word)) = self.0.get(name) { word } else { "" }
+    }
+
+    /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in base`, or `tool0`, which is in the cell.
+    pub fn pose_frames(&self) -> Option<[&str; 2]> {
+        let named = self.string("pose_frame").trim();
+        let [frame, base] = named.split_once(" in ").map_or([named, CELL_FRAME], |(frame, base)| [frame, base]);
+        (!named.is_empty()).then(|| [frame.trim(), base.trim()])
     }
 
     /// One that is a number; NaN for a name that is none.

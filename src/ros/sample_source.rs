@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::arguments::NodeConfig;
 use super::node::{as_pose, as_wrench};
+use super::parameters::CELL_FRAME;
 use super::port::Arrival;
 use crate::io::recording::{LiveMessage, LiveType, SampleKind};
 use crate::stylus::Message;
@@ -26,9 +27,9 @@ impl SampleSource {
     /// In words, where the type named by a parameter gives nothing: the parameters are checked before.
     pub fn of(config: &NodeConfig, kind: SampleKind) -> Result<Option<Self>, String> {
         let parameters = &config.parameters;
-        let (name, base) = (|of: &str| parameters.string(of).to_owned(), parameters.string("base_frame"));
+        let name = |of: &str| parameters.string(of).to_owned();
         let type_name = match kind {
-            SampleKind::Pose if !name("pose_frame").is_empty() => return Ok(None),
+            SampleKind::Pose if parameters.pose_frames().is_some() => return Ok(None),
             SampleKind::Pose => name("pose_type"),
             SampleKind::Wrench => name("wrench_type"),
         };
@@ -37,7 +38,7 @@ impl SampleSource {
             || LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header());
         let frame = match kind {
             SampleKind::Wrench if !is_pose_unnamed() => format!("{}_sensor", name("source")),
-            _ => base.to_owned(),
+            _ => CELL_FRAME.to_owned(),
         };
         let (usual, known) = (LiveType::of(kind, "")?, LiveType::of(kind, &type_name)?);
         Ok(Some(Self { kind, named: (!type_name.is_empty()).then_some(known), usual, frame }))
@@ -134,6 +135,5 @@ mod tests {
         assert_eq!(frame(&["source:=probe"], ""), "probe_sensor");
         let unnamed = "pose_type:=geometry_msgs/msg/Pose";
         assert_eq!(frame(&[unnamed], ""), "cell");
-        assert_eq!(frame(&[unnamed, "base_frame:=base"], ""), "base");
     }
 }

@@ -214,7 +214,7 @@ def test_transforms_of_unlike_rates_give_the_mesh_of_the_recording_that_has_them
     flags = ["--scan", demo_folder / "scan.ply", "--bag", path, "--scene", scene, "--out", tmp_path / "refined.ply"]
     done = touchup("refine", *flags, "--pose-frame", "tool0", "--base-frame", frame)
     assert done.returncode in (0, 4), done.stderr
-    ros = [*CYCLONE, "-p", "pose_frame:=tool0", "-p", f"base_frame:={frame}"]
+    ros = [*CYCLONE, "-p", f"pose_frame:=tool0 in {frame}"]
     with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=ros) as node:
         assert any("/tf" in line for line in node.out)
         messages = [(topic, sent) for _, topic, sent in sorted(published, key=lambda one: one[0])]

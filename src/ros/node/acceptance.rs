@@ -121,7 +121,7 @@ pub fn meaning(reason: &str) -> &'static str {
         "unknown_frame" => "their frame is in no transform: publish it on /tf or /tf_static",
         "transform" => "their frames are not connected at their stamps: look at /tf",
         "transforms_apart" => {
-            "links between pose_frame and base_frame are published too far apart in time: publish them more often, or name other frames"
+            "links up to pose_frame are published too far apart in time: publish them more often, or name other frames"
         }
         "quaternion" => "orientations are no rotations: normalise the quaternion at its source",
         "stamp" => "stamps are no time between 1970 and 2038: look at the clock of the source",

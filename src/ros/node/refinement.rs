@@ -133,7 +133,7 @@ impl RefinementWorker {
             taking_out: None,
             variance: VarianceWork::default(),
             doubts: InputDoubts::on(&setup.clock),
-            moving: setup.pose_frame.as_ref().map(|frame| MovingFrame::new(frame, &setup.base_frame)),
+            moving: setup.pose_frames.as_ref().map(|[frame, base]| MovingFrame::new(frame, base)),
             resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
             port,
