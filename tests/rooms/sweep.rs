@@ -10,7 +10,6 @@ use serde_json::{Value, json};
 use touchup::io::recording::{Topics, write_recording};
 
 use crate::cli::{code, flat_scan, json as one_object, text, touch, touchup};
-use crate::full;
 
 /// A folder with a scan and a recording of [`touch`], and what is swept over them.
 struct Sweep {
@@ -456,13 +455,11 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     assert_eq!(one_object(&same)["keys"], json!({}));
 }
 
-/// On the plate of the demo, told that the stylus is softer than it is, every touched surface comes out farther by the same bending: the top
+/// On the plate of the demo, where the stylus is said to be softer than it is, every touched surface comes out farther by the same bending: the top
 /// rises by it, holes and slot shrink and the boss grows by twice as much. What does not bend, the axes, stays.
 #[test]
+#[ignore = "full"]
 fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
-    if !full::is_full() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let keys = "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 15] }\n";
