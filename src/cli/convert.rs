@@ -45,7 +45,16 @@ struct Converted {
     wrenches: u64,
     pose_frame: String,
     wrench_frame: String,
+    /// where the pose is taken from transforms: poses for which some were interpolated, and stamps that they do not cover
+    #[serde(skip_serializing_if = "Option::is_none")]
+    transforms: Option<TransformCounts>,
     out: PathBuf,
+}
+
+#[derive(Debug, Serialize)]
+struct TransformCounts {
+    interpolated: u64,
+    outside: u64,
 }
 
 impl fmt::Display for Converted {
@@ -54,7 +63,11 @@ impl fmt::Display for Converted {
             |name: &str| if name.is_empty() { "a frame without a name".to_owned() } else { format!("{name:?}") };
         let (poses, wrenches) = (counted(self.poses, "pose", "poses"), counted(self.wrenches, "wrench", "wrenches"));
         let [pose_frame, wrench_frame] = [&self.pose_frame, &self.wrench_frame].map(|name| frame(name));
-        write!(f, "{poses} in {pose_frame}, {wrenches} in {wrench_frame}\nwrote {}", self.out.display())
+        writeln!(f, "{poses} in {pose_frame}, {wrenches} in {wrench_frame}")?;
+        if let Some(TransformCounts { interpolated, outside }) = self.transforms {
+            writeln!(f, "{interpolated} of the poses between transforms; {outside} stamps outside of them")?;
+        }
+        write!(f, "wrote {}", self.out.display())
     }
 }
 
@@ -75,7 +88,8 @@ pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> 
     let mut progress = WorkProgress::new("convert", reader.message_count());
     let copied = copy_recording(&mut reader, out, &topics, &mut || progress.step())?;
     let CopiedRecording { poses, wrenches, pose_frame, wrench_frame, damage } = copied;
-    let converted = Converted { poses, wrenches, pose_frame, wrench_frame, out: out.clone() };
+    let transforms = reader.transform_counts().map(|[interpolated, outside]| TransformCounts { interpolated, outside });
+    let converted = Converted { poses, wrenches, pose_frame, wrench_frame, transforms, out: out.clone() };
     print_report(*json, &converted, || converted.to_string())?;
     let mut losses: Losses = damage.iter().map(ToString::to_string).collect();
     losses.extend(reader.losses());

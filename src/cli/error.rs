@@ -294,7 +294,7 @@ impl From<SweepError> for CliError {
     fn from(error: SweepError) -> Self {
         match error {
             SweepError::Scene(error) => error.into(),
-            SweepError::Outcome(error) => error.into(),
+            SweepError::Outcome(error) => (*error).into(),
             SweepError::Features(error) => error.into(),
             SweepError::Simulated(error) => error.into(),
             SweepError::File(error @ FileError::Write { .. }) => Self::not_written(error),
@@ -323,7 +323,7 @@ impl From<RefinementError> for CliError {
             RefinementError::Setting(error) => error.into(),
             RefinementError::Replay(error) => error.into(),
             RefinementError::Live(error) => error.into(),
-            RefinementError::Outcome(error) => error.into(),
+            RefinementError::Outcome(error) => (*error).into(),
             RefinementError::NothingMoves => Self::new(("usage", 2), error, None),
             RefinementError::Unsound { .. } | RefinementError::NoSample { .. } => Self::new(UNSOUND, error, None),
         }

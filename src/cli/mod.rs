@@ -260,8 +260,9 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
     // the last one counts
     let level = ros.iter().rposition(|word| *word == "--log-level").and_then(|at| ros.get(at + 1)?.to_str());
     let level = level.and_then(|level| log_level(level).ok()?.parse().ok()).unwrap_or(LevelFilter::WARN);
-    // the libraries below say what is no matter of the user; the last two complain, whenever a node ends, about writers that have left
-    // the graph already, and that a group was joined for each network and is not left for all of them at once
+    // the libraries below say what is no matter of the user; the last three complain, whenever a node ends, about writers that have left
+    // the graph already, and that a group was joined for each network and is not left for all of them at once; and about a topic that
+    // turns to the type that others publish, which the node itself says
     let libraries = [
         ("ros2_client", LevelFilter::ERROR),
         // what it sends to /rosout is in the log already
@@ -269,6 +270,7 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
         ("rustdds", LevelFilter::ERROR),
         ("rustdds::dds::pubsub", LevelFilter::OFF),
         ("rustdds::network::udp_listener", LevelFilter::OFF),
+        ("rustdds::discovery::discovery_db", LevelFilter::OFF),
     ];
     Targets::new().with_default(level).with_targets(libraries)
 }

@@ -61,7 +61,7 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     let Begun { ready, nominal, inbox, arrivals, port, arm } = begun;
     let (port, _page) = arguments.web.serve(opened, nominal, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, arm)?;
-    let topics: Vec<_> = config.sample_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
+    let topics: Vec<_> = config.heard_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
     print_result(&format!(
         "{} listens to {}; Ctrl-C saves and ends it",
         config.place.full_name(),

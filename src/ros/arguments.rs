@@ -221,6 +221,12 @@ impl NodeConfig {
         }
     }
 
+    /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or transforms.
+    pub fn heard_topics(&self) -> [&'static str; 2] {
+        let [wrench, pose] = self.sample_topics();
+        [wrench, if self.parameters.pose_frames().is_none() { pose } else { "/tf" }]
+    }
+
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {
         let form = "FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench";
         let malformed = || ArgumentError::Form { given: format!("--remap {text}"), form };

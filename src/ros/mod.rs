@@ -19,6 +19,7 @@ pub mod port;
 #[cfg(feature = "r2r")]
 pub mod r2r;
 mod refusal;
+mod sample_source;
 mod send_queue;
 mod services;
 pub mod stop;

@@ -155,8 +155,8 @@ fn describe(name: &str) -> messages::ParameterDescriptor {
         Allowed::Double(_, from_value, to_value) => {
             described.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];
         }
-        Allowed::OneOf(_, words) => described.additional_constraints = format!("one of {}", words.join(", ")),
-        Allowed::Bool(_) | Allowed::String(_) => {}
+        Allowed::OneOf(_, words) => described.additional_constraints = words.join(", "),
+        Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => {}
     }
     described
 }
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!((rate.r#type, rate.read_only, range.from_value, range.to_value), (3, false, 0.1, 100.0));
         let robot = describe("robot");
         assert_eq!((robot.r#type, robot.read_only), (4, true));
-        assert_eq!(robot.additional_constraints, "one of none, sim, ur, ros2_control");
+        assert_eq!(robot.additional_constraints, "none, sim, ur, ros2_control");
         assert_eq!(describe("use_sim_time").r#type, 1);
         assert_eq!((describe("nothing").r#type, describe("nothing").name.as_str()), (0, "nothing"));
     }

@@ -6,6 +6,7 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::io::mesh_file::MeshUnit;
+use crate::io::recording::{LiveType, SampleKind};
 use crate::scene::nearest;
 use touchup_core::parameters::Value;
 
@@ -79,6 +80,8 @@ pub enum Allowed {
     Double(f64, f64, f64),
     /// any word
     String(&'static str),
+    /// a type of messages that give poses or wrenches; empty: that of who publishes them
+    SampleType(SampleKind),
     /// the default, and the words to choose from
     OneOf(&'static str, &'static [&'static str]),
 }
@@ -107,13 +110,16 @@ pub struct ParameterDescriptor {
     pub description: &'static str,
 }
 
+/// The frame of poses that name none.
+pub const CELL_FRAME: &str = "cell";
+
 /// Names of the kinds of features by their numbers in messages.
 pub const KIND_NAMES: [&str; 10] =
     ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch"];
 
 /// All parameters of the node, those of docs/ros.md and the one that every node has.
 pub const PARAMETERS: &[ParameterDescriptor] = {
-    use Allowed::{Bool, Double, OneOf, String};
+    use Allowed::{Bool, Double, OneOf, SampleType, String};
     const fn fixed(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
         ParameterDescriptor { name, allowed, settable: Settable::AtStart, description }
     }
@@ -129,6 +135,9 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
         fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
         fixed("object_frame", String("object"), "frame of the mesh"),
         fixed("tool_frame", String(""), "frame whose pose comes; empty: as source"),
+        fixed("pose_type", SampleType(SampleKind::Pose), "type of the poses; empty: as published"),
+        fixed("wrench_type", SampleType(SampleKind::Wrench), "type of the wrenches; empty: as published"),
+        fixed("pose_frame", String(""), "whose pose is taken from /tf, as tool0 or tool0 in base; empty: of a topic"),
         live("view_rate_hz", Double(20.0, 0.1, 100.0), "tiles and tip markers"),
         live("features_rate_hz", Double(5.0, 0.1, 100.0), "features while they change"),
         live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
@@ -198,6 +207,14 @@ pub enum ParameterError {
         /// to choose from
         words: &'static [&'static str],
     },
+    /// no type that gives what is wanted
+    #[error("{name} is {why}")]
+    SampleType {
+        /// which one
+        name: &'static str,
+        /// what it is instead, and what can be read
+        why: String,
+    },
     /// only when the node starts
     #[error("{name} cannot be set while the node runs: start it again with -p {name}:={value}")]
     NotLive {
@@ -227,6 +244,7 @@ impl ParameterDescriptor {
             Allowed::Bool(on) => ParameterValue::Bool(on),
             Allowed::Double(number, ..) => ParameterValue::Double(number),
             Allowed::String(word) | Allowed::OneOf(word, _) => ParameterValue::String(word.to_owned()),
+            Allowed::SampleType(_) => ParameterValue::String(String::new()),
         }
     }
 
@@ -257,6 +275,10 @@ impl ParameterDescriptor {
             (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => within(name, *whole as f64, from, to),
             (Allowed::OneOf(_, words), ParameterValue::String(word)) if !words.contains(&word.as_str()) => {
                 Err(ParameterError::Word { name, value: word.clone(), words })
+            }
+            (Allowed::SampleType(kind), ParameterValue::String(type_name)) => {
+                let known = LiveType::of(kind, type_name);
+                known.map(|_| value.clone()).map_err(|why| ParameterError::SampleType { name, why })
             }
             (Allowed::Bool(_), ParameterValue::Bool(_))
             | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => Ok(value.clone()),
@@ -326,6 +348,13 @@ impl Parameters {
     /// One that is a word; empty for a name that is none.
     pub fn string(&self, name: &str) -> &str {
         if let Some(ParameterValue::String(word)) = self.0.get(name) { word } else { "" }
+    }
+
+    /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in base`, or `tool0`, which is in the cell.
+    pub fn pose_frames(&self) -> Option<[&str; 2]> {
+        let named = self.string("pose_frame").trim();
+        let [frame, base] = named.split_once(" in ").map_or([named, CELL_FRAME], |(frame, base)| [frame, base]);
+        (!named.is_empty()).then(|| [frame.trim(), base.trim()])
     }
 
     /// One that is a number; NaN for a name that is none.

@@ -1,15 +1,15 @@
 //! The topics of docs/ros.md, each with its quality of service.
 
-use std::time::Instant;
-
 use super::arguments::NodeConfig;
 use super::exchange::{Exchange, RosError};
 use super::messages::{
     Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped,
-    PoseStamped, ProbeResult, ProbeTouch, TFMessage, WrenchStamped,
+    ProbeResult, ProbeTouch, TFMessage,
 };
 use super::port::{Arrival, MESH_PATCH_TOPIC, Publication};
+use super::sample_source::SampleSource;
 use super::send_queue::Sent;
+use crate::io::recording::SampleKind;
 
 /// A topic and its quality of service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +60,12 @@ pub(super) trait Subscribes<M> {
     fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError>;
 }
 
+/// A back end that listens to poses and wrenches of any type that gives them.
+pub(super) trait SubscribesSamples {
+    /// Listens: what comes goes to the inbox of the node.
+    fn subscribe_samples(&mut self, topic: Topic, source: SampleSource) -> Result<(), RosError>;
+}
+
 /// Announces topics; what sends their messages, or gives back what a slow listener holds up.
 macro_rules! publishers {
     ($(#[$doc:meta])* fn $announce:ident; $($send:ident: $publication:ident($message:ident) on $topic:expr;)+) => {
@@ -101,15 +107,16 @@ publishers! {
 /// Everything that is listened to.
 pub(super) fn subscribe<B>(config: &NodeConfig, back_end: &mut B) -> Result<(), RosError>
 where
-    B: Subscribes<WrenchStamped>
-        + Subscribes<PoseStamped>
-        + Subscribes<TFMessage>
-        + Subscribes<PointStamped>
-        + Subscribes<Clock>,
+    B: SubscribesSamples + Subscribes<TFMessage> + Subscribes<PointStamped> + Subscribes<Clock>,
 {
     let [wrench, pose] = config.sample_topics();
-    back_end.subscribe(Topic::best_effort(wrench, SAMPLES), |_, message| Arrival::Wrench(message, Instant::now()))?;
-    back_end.subscribe(Topic::best_effort(pose, SAMPLES), |_, message| Arrival::Pose(message, Instant::now()))?;
+    for (topic, kind) in [(wrench, SampleKind::Wrench), (pose, SampleKind::Pose)] {
+        let remedy = "name a type that can be read, or none";
+        let refused = |reason| RosError::Refused { call: "subscribing to a topic", reason, remedy };
+        if let Some(source) = SampleSource::of(config, kind).map_err(refused)? {
+            back_end.subscribe_samples(Topic::best_effort(topic, SAMPLES), source)?;
+        }
+    }
     back_end.subscribe(Topic::best_effort("/tf", SAMPLES), |_, message| Arrival::Tf(message))?;
     back_end.subscribe(Topic::latched("/tf_static", 100), |_, message| Arrival::TfStatic(message))?;
     back_end.subscribe(Topic::reliable("/clicked_point", 10), |_, message| Arrival::ClickedPoint(message))?;

@@ -40,32 +40,54 @@ def wrench(read):
     return Wrench(vector(Vector3, read.wrench.force), vector(Vector3, read.wrench.torque))
 
 
-def in_step(node, recording, domain):
-    """Plays it, and yields each time that the node has taken what was sent. The node has `service_mapping:=cyclone`."""
+STAMPED = {
+    "/stylus/pose": ("/stylus/pose", PoseStamped, lambda header, read: PoseStamped(header, pose(read))),
+    "/stylus/wrench": ("/stylus/wrench", WrenchStamped, lambda header, read: WrenchStamped(header, wrench(read))),
+}
+
+
+def recorded(recording, streams=STAMPED):
+    """Messages of a recording in order of their stamps, as a sensor sends them: topic and message.
+
+    For each topic of the recording that on which it is played, the type, and what makes one of a header and of what was read.
+    """
+    messages = []
+    with recording.open("rb") as file:
+        for _, channel, _, read in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(list(streams)):
+            topic, _, make = streams[channel.topic]
+            stamp = Time(read.header.stamp.sec, read.header.stamp.nanosec)
+            messages.append(((stamp.sec, stamp.nanosec), topic, make(Header(stamp, read.header.frame_id), read)))
+    messages.sort(key=lambda message: message[0])
+    return [(topic, message) for _, topic, message in messages]
+
+
+def sent_in_step(node, domain, kinds, messages):
+    """Sends messages, and yields each time that the node has taken what was sent. The node has `service_mapping:=cyclone`.
+
+    - `kinds`: the type of each topic; `messages`: topic and message each, or topic and what makes the message when it is sent.
+    """
     peer = Peer(domain)
-    kinds = {"/stylus/pose": (PoseStamped, pose), "/stylus/wrench": (WrenchStamped, wrench)}
-    writers = {topic: peer.writer(topic, kind, BEST_EFFORT) for topic, (kind, _) in kinds.items()}
+    writers = {topic: peer.writer(topic, kind, BEST_EFFORT) for topic, kind in kinds.items()}
     # the node hears of writers in the order in which they are made: when it answers, it knows those of the samples
     state = Client(node, domain, "arm_state", TriggerRequest, TriggerResponse, peer)
     state.introduce(0)
-    messages = []
-    with recording.open("rb") as file:
-        for _, channel, _, read in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(list(kinds)):
-            kind, convert = kinds[channel.topic]
-            stamp = Time(read.header.stamp.sec, read.header.stamp.nanosec)
-            made = kind(Header(stamp, read.header.frame_id), convert(read))
-            messages.append(((stamp.sec, stamp.nanosec), channel.topic, made))
-    # as a sensor sends them, and the node takes them
-    messages.sort(key=lambda message: message[0])
+    # and has turned to their types
+    node.wait_for(lambda: all(writer.get_matched_subscriptions() for writer in writers.values()))
     for begin in range(0, len(messages), WINDOW):
-        for _, topic, message in messages[begin : begin + WINDOW]:
-            writers[topic].write(message)
+        for topic, message in messages[begin : begin + WINDOW]:
+            writers[topic].write(message() if callable(message) else message)
         state.ask(0)
         yield
     state.ask(0)
 
 
-def play_in_step(node, recording, domain):
+def in_step(node, recording, domain, streams=STAMPED):
+    """Plays a recording so."""
+    kinds = {topic: kind for topic, kind, _ in streams.values()}
+    return sent_in_step(node, domain, kinds, recorded(recording, streams))
+
+
+def play_in_step(node, recording, domain, streams=STAMPED):
     """Plays all of it."""
-    for _ in in_step(node, recording, domain):
+    for _ in in_step(node, recording, domain, streams):
         pass

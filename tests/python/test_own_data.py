@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 from test_recordings import POSE, WRENCH, numbers
 
 START_NS = 1_700_000_000_000_000_000
@@ -215,6 +215,48 @@ def test_a_pose_is_taken_from_a_tree_of_transforms(touchup, tmp_path, kind):
         assert done.returncode == 3 and all(word in done.stderr for word in words), done.stderr
 
 
+def test_links_of_unlike_rates_are_interpolated_and_counted(touchup, tmp_path):
+    """SciPy's slerp and NumPy's interp of the slow link, at the stamps of the fast one; over a gap, and beyond its ends, there is nothing."""
+    messages = Messages(Stores.ROS2_HUMBLE)
+    stamps, positions, rotations, wrenches = values(500)
+    rotations = Rotation.from_rotvec(np.cumsum(0.01 * rotations.as_rotvec(), axis=0))
+    slow_at = np.arange(3, 480, 10)
+    # 2 ms apart: from 203 to 293 are 0.18 s
+    slow_at = slow_at[(slow_at <= 203) | (slow_at >= 293)]
+    name = "tf2_msgs/msg/TFMessage"
+    _, slow, turns, _ = values(len(slow_at), seed=3)
+    fast = [(t, messages.of(name, transforms=[messages.transform(t, "arm", "tool0", p, r)])) for t, p, r in zip(stamps, positions, rotations)]
+    # half a period beside the stamps of the others, but for every second one
+    slow_stamps = stamps[slow_at] + np.where(np.arange(len(slow_at)) % 2, PERIOD_NS // 2, 0)
+    base = [(t, messages.of(name, transforms=[messages.transform(t, "base", "arm", p, r)])) for t, p, r in zip(slow_stamps, slow, turns)]
+    stamped = [messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(t, "tool0"), wrench=messages.wrench(w)) for t, w in zip(stamps, wrenches)]
+    topics = [("/tf", name, fast + base), ("/wrench", "geometry_msgs/msg/WrenchStamped", list(zip(stamps, stamped)))]
+    path = write(tmp_path, "mcap", messages, topics)
+    out = tmp_path / "converted.mcap"
+    done = touchup("convert", path, "--out", out, "--json", "--pose-frame", "tool0", "--base-frame", "base", "--wrench-topic", "/wrench")
+    found = []
+    with AnyReader([out], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, _, payload in reader.messages():
+            if connection.topic == POSE:
+                found.append(numbers(reader.deserialize(payload, connection.msgtype)))
+    every = np.union1d(stamps, slow_stamps)
+    within = every[(every >= slow_stamps[0]) & (every <= slow_stamps[-1])]
+    gap = (within > slow_stamps[slow_at <= 203][-1]) & (within < slow_stamps[slow_at >= 293][0])
+    expected = within[~gap]
+    assert [stamp for stamp, _, _ in found] == list(expected)
+    of = lambda at, known, poses: np.stack([np.interp(at - START_NS, known - START_NS, poses[:, axis]) for axis in range(3)], axis=1)
+    turn = lambda at, known, of: Slerp(known - START_NS, of)(at - START_NS)
+    arm, arm_turn = of(expected, slow_stamps, slow), turn(expected, slow_stamps, turns)
+    tool, tool_turn = of(expected, stamps, positions), turn(expected, stamps, rotations)
+    got = np.array([values for _, _, values in found])
+    assert np.abs(got[:, :3] - arm - arm_turn.apply(tool)).max() < 1e-9
+    assert (np.abs(np.abs((got[:, 3:] * (arm_turn * tool_turn).as_quat()).sum(axis=1)) - 1) < 1e-9).all()
+    both = np.isin(expected, stamps) & np.isin(expected, slow_stamps)
+    told = json.loads(done.stdout)["transforms"]
+    assert told == {"interpolated": int((~both).sum()), "outside": len(every) - len(within)}
+    assert done.returncode == 4 and f"{gap.sum()} messages transforms_apart" in done.stderr, done.stderr
+
+
 def test_a_table_of_pandas_is_read_with_the_units_of_its_header(touchup, tmp_path):
     stamps, positions, rotations, wrenches = values(80)
     table = pandas.DataFrame(positions * 1e3, columns=["x_mm", "y_mm", "z_mm"])
@@ -317,6 +359,84 @@ def test_the_state_of_a_franka_holds_pose_and_wrench(touchup, tmp_path):
     found = np.array([numbers for _, _, numbers in poses])
     assert np.abs(found[:, :3] - positions).max() == 0
     assert (np.abs(np.abs((found[:, 3:] * rotations.as_quat()).sum(axis=1)) - 1) < 1e-12).all()
+
+
+def test_the_state_of_franka_ros2_holds_pose_and_wrench_each_with_its_frame(touchup, tmp_path):
+    """By the definition of franka_msgs 1.0 for ROS 2; one topic gives both, or the wrench comes from a sensor of its own."""
+    parts = {
+        "CollisionIndicators": "geometry_msgs/Vector3 a\ngeometry_msgs/Vector3 b\ngeometry_msgs/Vector3 c\ngeometry_msgs/Vector3 d\nfloat64[7] e\nfloat64[7] f",
+        "Elbow": "\n".join(f"float64[2] {name}" for name in ["position", "desired", "commanded", "velocity", "acceleration"]),
+        "Errors": "\n".join(f"bool error_{at}" for at in range(37)),
+    }
+    text = """std_msgs/Header header
+franka_msgs/CollisionIndicators collision_indicators
+sensor_msgs/JointState measured_joint_state
+sensor_msgs/JointState desired_joint_state
+sensor_msgs/JointState measured_joint_motor_state
+float64[7] ddq_d
+float64[7] dtau_j
+sensor_msgs/JointState tau_ext_hat_filtered
+franka_msgs/Elbow elbow
+geometry_msgs/WrenchStamped k_f_ext_hat_k
+geometry_msgs/WrenchStamped o_f_ext_hat_k
+geometry_msgs/InertiaStamped inertia_ee
+geometry_msgs/InertiaStamped inertia_load
+geometry_msgs/InertiaStamped inertia_total
+geometry_msgs/PoseStamped o_t_ee
+geometry_msgs/PoseStamped o_t_ee_d
+geometry_msgs/PoseStamped o_t_ee_c
+geometry_msgs/PoseStamped f_t_ee
+geometry_msgs/PoseStamped ee_t_k
+geometry_msgs/TwistStamped o_dp_ee_d
+geometry_msgs/TwistStamped o_dp_ee_c
+geometry_msgs/AccelStamped o_ddp_ee_c
+float64 time
+float64 control_command_success_rate
+uint8 robot_mode
+franka_msgs/Errors current_errors
+franka_msgs/Errors last_motion_errors
+"""
+    messages = Messages(Stores.ROS2_HUMBLE)
+    for name, part in parts.items():
+        messages.store.register(get_types_from_msg(part, f"franka_msgs/msg/{name}"))
+    state_type = "franka_msgs/msg/FrankaRobotState"
+    messages.store.register(get_types_from_msg(text, state_type))
+    random = np.random.default_rng(6)
+    fields = messages.store.get_msgdef(state_type).fields
+
+    def drawn(kind):
+        """A message of any type, its numbers drawn at random."""
+        made = {}
+        for name, (node, what) in messages.store.get_msgdef(kind).fields:
+            if node.name == "NAME":
+                made[name] = drawn(what)
+            elif node.name == "ARRAY":
+                made[name] = random.normal(size=what[1])
+            elif node.name == "SEQUENCE":
+                count = int(random.integers(0, 8))
+                made[name] = [f"joint{at}" * at for at in range(count)] if what[0][1][0] == "string" else random.normal(size=count)
+            elif what[0] in ("float64", "string", "bool"):
+                made[name] = {"float64": float(random.normal()), "string": "x" * int(random.integers(0, 9)), "bool": False}[what[0]]
+            else:
+                made[name] = int(random.integers(0, 9))
+        return messages.store.types[kind](**made)
+
+    stamps, positions, rotations, wrenches = values(40)
+    assert len(fields) == 27
+    rows = []
+    for at, (t, p, r, w) in enumerate(zip(stamps, positions, rotations, wrenches)):
+        state = drawn(state_type)
+        state.header = messages.header(t, "base")
+        state.o_t_ee = messages.of("geometry_msgs/msg/PoseStamped", header=messages.header(0, ""), pose=messages.pose(p, r))
+        state.o_f_ext_hat_k = messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(0, "fr3_link0"), wrench=messages.wrench(w))
+        rows.append((t, state))
+    other = [(t, messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(t, "ft"), wrench=messages.wrench(-w))) for t, w in zip(stamps, wrenches)]
+    topic = "/franka_robot_state_broadcaster/robot_state"
+    path = write(tmp_path, "mcap", messages, [(topic, state_type, rows), ("/ft", "geometry_msgs/msg/WrenchStamped", other)])
+    for source, expected, frame in [(topic, wrenches, "fr3_link0"), ("/ft", -wrenches, "ft")]:
+        poses, forces, _ = converted(touchup, tmp_path, path, "--pose-topic", topic, "--wrench-topic", source)
+        assert_same(poses, stamps, np.hstack([positions, rotations.as_quat()]), "base", 1e-15)
+        assert_same(forces, stamps, expected, frame)
 
 
 def test_touches_and_features_are_the_same_as_csv_and_as_parquet(touchup, demo_folder, tmp_path):

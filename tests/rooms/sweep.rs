@@ -91,7 +91,7 @@ const ONE_JOB: &str = "keys: { tip.radius_mm: 1.5 }\n";
 #[test]
 fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() {
     let sweep = Sweep::new(
-        "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [10, 20], contact.on_n: { from: 0.2, to: 0.4, steps: 3 } }\n",
+        "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [10, 20], contact.on_n: { from: 0.4, to: 0.8, steps: 3 } }\n",
     );
     fs::copy(sweep.path("touch.mcap"), sweep.path("again.mcap")).unwrap();
     let planned = touchup(
@@ -107,11 +107,11 @@ fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() 
         (number("contact.on_n"), number("tip.stiffness_n_per_mm"), job["recording"].as_str().unwrap().to_owned())
     };
     let expected = [
-        (0.2, 10.0, "touch.mcap"),
-        (0.2, 10.0, "again.mcap"),
-        (0.2, 20.0, "touch.mcap"),
-        (0.2, 20.0, "again.mcap"),
-        (0.3, 10.0, "touch.mcap"),
+        (0.4, 10.0, "touch.mcap"),
+        (0.4, 10.0, "again.mcap"),
+        (0.4, 20.0, "touch.mcap"),
+        (0.4, 20.0, "again.mcap"),
+        (0.6, 10.0, "touch.mcap"),
     ];
     let first: Vec<_> = jobs.iter().take(5).map(row).collect();
     assert_eq!(first, expected.map(|(on, k, name)| (on, k, name.to_owned())));
@@ -204,7 +204,7 @@ fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
     assert_eq!(one_object(&again)["summary"], summary);
     assert_eq!(code(&one.run(&["--job", "0", "--again"])), 0);
     assert_eq!(one.result("results", id), result);
-    assert_eq!(one.names_in("results"), [id.clone()]);
+    assert_eq!(one.names_in("results"), std::slice::from_ref(id));
 }
 
 /// The mesh and the features are those of `touchup refine` with the same scene.
@@ -332,7 +332,7 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
         let ran = sweep.run(&[]);
         assert_eq!(code(&ran), 4);
         assert!(
-            text(&ran.stderr).contains("job 1 failed: the recording on the scan: contact.on_n is 3.00 N"),
+            text(&ran.stderr).contains("job 1 failed: the recording on the scan: the contacts reach 2.00 N"),
             "{}",
             text(&ran.stderr)
         );
@@ -366,7 +366,7 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
 // ---- whatif -----------------------------------------------------------------------------------------------------
 
 /// A result as a job leaves it: a sheet of 21 × 21 vertices that rises by `step` mm from column to column, known to `sigma` mm.
-fn sheet_result(folder: &Path, scan: &str, stiffness: f64, step: f64, sigma: f64, features: &Value) -> String {
+fn sheet_result(folder: &Path, scan: &str, stiffness: i32, step: f64, sigma: f64, features: &Value) -> String {
     fs::create_dir(folder).unwrap();
     let mut lines = flat_scan().lines().map(str::to_owned).collect::<Vec<_>>();
     let head = lines.iter().position(|line| line == "end_header").unwrap();
@@ -396,8 +396,8 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
             "std": { "center_mm": 0.01, "diameter_mm": std } }])
     };
     let at = |name: &str| folder.path().join(name);
-    let a = sheet_result(&at("a"), "s", 20.0, 0.0, 0.02, &hole(6.0, 0.01));
-    let b = sheet_result(&at("b"), "s", 10.0, 0.01, 0.05, &hole(6.05, 0.02));
+    let a = sheet_result(&at("a"), "s", 20, 0.0, 0.02, &hole(6.0, 0.01));
+    let b = sheet_result(&at("b"), "s", 10, 0.01, 0.05, &hole(6.05, 0.02));
     let [page, vertices, features, mesh] =
         ["page.html", "v.csv", "f.csv", "m.ply"].map(|name| at(name).to_str().unwrap().to_owned());
     let outs = ["--out", &page, "--vertices-out", &vertices, "--features-out", &features, "--mesh-out", &mesh];
@@ -417,7 +417,7 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
     let rows = fs::read_to_string(&vertices).unwrap();
     assert_eq!(rows.lines().next(), Some("mesh,vertex,x_mm,y_mm,z_mm,displacement_mm,plus_minus_mm,moved"));
     assert_eq!((rows.lines().count(), rows.lines().filter(|row| row.ends_with(",true")).count()), (442, 210));
-    assert_eq!(fs::read_to_string(&features).unwrap().lines().filter(|row| row.ends_with(",true")).count(), 1);
+    assert_eq!(fs::read_to_string(&features).unwrap().lines().filter(|row| row.contains(",true")).count(), 1);
     assert!(String::from_utf8_lossy(&fs::read(&mesh).unwrap()).contains("displacement_mm"));
     let html = fs::read_to_string(&page).unwrap();
     for expected in
@@ -429,7 +429,7 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
     let words = touchup(&["whatif", &a, &b], "");
     assert!(text(&words.stdout).contains("diameter_mm 6.000 → 6.050 (+0.050, ± 0.040)"), "{}", text(&words.stdout));
 
-    let other = sheet_result(&at("c"), "t", 20.0, 0.0, 0.02, &json!([]));
+    let other = sheet_result(&at("c"), "t", 20, 0.0, 0.02, &json!([]));
     let refused = touchup(&["whatif", &a, &other], "");
     assert!(code(&refused) == 2 && text(&refused.stderr).contains("different scans"), "{}", text(&refused.stderr));
     let none = touchup(&["whatif", &a, folder.path().to_str().unwrap()], "");
@@ -453,6 +453,44 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     let same = touchup(&["whatif", "0", "0", "--jobs", &sweep.name("jobs.jsonl"), "--json"], "");
     assert_eq!(one_object(&same)["vertices_a"]["moved"], 0);
     assert_eq!(one_object(&same)["keys"], json!({}));
+}
+
+/// On the plate of the demo, where the stylus is said to be softer than it is, every touched surface comes out farther by the same bending: the top
+/// rises by it, holes and slot shrink and the boss grows by twice as much. What does not bend, the axes, stays.
+#[test]
+#[ignore = "full"]
+fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let keys = "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 15] }\n";
+    fs::write(at("grid.yaml"), format!("simulate: {{ part: plate, seeds: [1] }}\n{keys}")).unwrap();
+    let planned = touchup(&["sweep", "plan", &at("grid.yaml"), "--out", &at("jobs.jsonl")], "");
+    assert_eq!(code(&planned), 0, "{}", text(&planned.stderr));
+    assert_eq!(code(&touchup(&["sweep", "run", &at("jobs.jsonl")], "")), 0);
+    // the plan has the stiffnesses as they are listed
+    let report = one_object(&touchup(&["whatif", "0", "1", "--jobs", &at("jobs.jsonl"), "--json"], ""));
+    assert_eq!(report["keys"], json!({ "tip.stiffness_n_per_mm": [20, 15] }));
+    let features = report["features"].as_array().unwrap();
+    let number = |feature: &Value, name: &str| {
+        let numbers = feature["numbers"].as_array().unwrap();
+        numbers.iter().find(|number| number["name"] == name).cloned().unwrap()
+    };
+    let top =
+        features.iter().find(|one| one["kind"] == "plane" && one["center_mm"][2].as_f64().unwrap() > 11.9).unwrap();
+    let rise = number(top, "center_mm")["change"].as_f64().unwrap();
+    assert!(number(top, "center_mm")["moved"] == true && rise > 0.0, "{top}");
+    for (kind, name, sign) in [("hole", "diameter_mm", -2.0), ("slot", "width_mm", -2.0), ("boss", "diameter_mm", 2.0)]
+    {
+        for feature in features.iter().filter(|one| one["kind"] == kind) {
+            let size = number(feature, name);
+            let (change, known) = (size["change"].as_f64().unwrap(), size["plus_minus"].as_f64().unwrap());
+            assert!(
+                (change - sign * rise).abs() <= known && size["moved"] == true,
+                "{kind}: {change} for {rise} ± {known}"
+            );
+            assert_eq!(number(feature, "axis_deg")["moved"], false, "{feature}");
+        }
+    }
 }
 
 // ---- simulated --------------------------------------------------------------------------------------------------

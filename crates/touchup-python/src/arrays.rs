@@ -230,6 +230,9 @@ pub fn messages_into(messages: &[Message], frame: WrenchFrame, into: &Bound<'_, 
     into.set_item("wrench_frame", if frame == WrenchFrame::Object { "object" } else { "sensor" })
 }
 
+/// What an array has of each touch, by its name.
+type Column<T> = (&'static str, fn(&ProbedPoint) -> T);
+
 /// Touches as one array: a row for each, in the columns of [`touches_of`].
 ///
 /// # Errors
@@ -238,7 +241,7 @@ pub fn touches_array<'py>(py: Python<'py>, touches: &[ProbedPoint]) -> PyResult<
     let into = PyDict::new(py);
     into.set_item("stamp_ns", PyArray1::from_iter(py, touches.iter().map(|touch| touch.stamp_ns)))?;
     into.set_item("stroke", PyArray1::from_iter(py, touches.iter().map(|touch| touch.stroke)))?;
-    let triples: [(&str, fn(&ProbedPoint) -> [f64; 3]); 3] = [
+    let triples: [Column<[f64; 3]>; 3] = [
         ("centre", |touch| touch.centre.coords.into()),
         ("point", |touch| touch.point.coords.into()),
         ("normal", |touch| touch.normal.into()),
@@ -246,7 +249,7 @@ pub fn touches_array<'py>(py: Python<'py>, touches: &[ProbedPoint]) -> PyResult<
     for (name, triple) in triples {
         into.set_item(name, matrix(py, touches.iter().map(triple).collect())?)?;
     }
-    let numbers: [(&str, fn(&ProbedPoint) -> f64); 5] = [
+    let numbers: [Column<f64>; 5] = [
         ("radius", |touch| touch.radius),
         ("sigma", |touch| touch.sigma),
         ("calibration_sigma", |touch| touch.calibration),

@@ -50,5 +50,5 @@ mod _touchup {
     #[pymodule_export]
     use crate::simulating::simulate;
     #[pymodule_export]
-    use crate::sweeping::{sweep_plan, sweep_run_job, sweep_tables, what_if};
+    use crate::sweeping::{run_job, sweep_plan, sweep_tables, what_if};
 }

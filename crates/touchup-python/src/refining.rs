@@ -132,7 +132,7 @@ impl Reported {
 
 /// Where samples come from.
 enum Touching {
-    File { recording: Recording, path: PathBuf, markers: Option<String> },
+    File { recording: Box<Recording>, path: PathBuf, markers: Option<String> },
     Messages { all: Vec<Message>, frame: WrenchFrame },
 }
 
@@ -150,7 +150,7 @@ fn refined(
     let (touches, recording_name) = match touching()? {
         Touching::File { recording, path, markers } => {
             let markers = marker_filter(&input.scene, markers.as_deref())?.map(Box::new);
-            (TouchSource::Recorded { recording: Box::new(recording), markers }, path)
+            (TouchSource::Recorded { recording, markers }, path)
         }
         Touching::Messages { all, frame } => {
             (TouchSource::Messages { messages: all, wrench_frame: frame }, shown(None, "the recording"))
@@ -194,7 +194,8 @@ pub fn refine<'py>(
             (Some((all, frame)), None) => Ok(Touching::Messages { all, frame }),
             (None, Some((path, pose, wrench, markers, stamp))) => {
                 let topics = topics(pose, wrench, markers.clone());
-                Ok(Touching::File { recording: Recording::open(&path, &topics, stamps_of(&stamp)?)?, path, markers })
+                let recording = Box::new(Recording::open(&path, &topics, stamps_of(&stamp)?)?);
+                Ok(Touching::File { recording, path, markers })
             }
             _ => Err(usage("a recording is a Recording of arrays, or the path of a file".to_owned())),
         };

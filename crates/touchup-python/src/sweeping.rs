@@ -8,7 +8,9 @@ use pyo3::types::PyDict;
 use serde_json::json;
 use touchup::cli::{plan_sweep, what_if_json};
 use touchup_core::compare::Displacement;
-use touchup_session::sweep::{COVERAGE, GivenInput, JobResult, JobRunner, JobsFile, SweepTables, WhatIf, tables_of};
+use touchup_session::sweep::{
+    COVERAGE, GivenInput, JobReport, JobResult, JobRunner, JobsFile, SweepTables, WhatIf, tables_of,
+};
 
 use crate::arrays::{Compact, json as to_json};
 use crate::failure::at_work;
@@ -20,37 +22,43 @@ pub fn sweep_plan(py: Python<'_>, grid: PathBuf, recordings: Vec<PathBuf>, out: 
     at_work(py, || plan_sweep(&grid, &recordings, &out))
 }
 
-/// Runs one job, and returns what came of it as JSON.
+/// Runs one job as `touchup sweep run --job` does; one that has its result returns at once.
+///
+/// - `scan`, `recording`: content of their files, where the caller has it already: then they are not read.
+///
+/// Returns `job`, `id`, `result` (its folder), `was_there`, `failed` (why, or None) and `summary`, a text of JSON.
 #[pyfunction]
-#[pyo3(signature = (jobs, job, results, scan, recording, again))]
-pub fn sweep_run_job(
-    py: Python<'_>,
+pub fn run_job<'py>(
+    py: Python<'py>,
     jobs: PathBuf,
     job: u64,
-    results: PathBuf,
+    results: Option<PathBuf>,
     scan: Option<&[u8]>,
     recording: Option<&[u8]>,
     again: bool,
-) -> PyResult<String> {
-    at_work(py, || {
+) -> PyResult<Bound<'py, PyDict>> {
+    let JobReport { job, id, result, was_there, failed, summary } = at_work(py, || {
+        let folder = JobsFile::folder(&jobs);
+        let results = results.unwrap_or_else(|| folder.join("results"));
         let line = JobsFile::job(&jobs, job)?;
-        let runner = JobRunner::new(JobsFile::folder(&jobs), results);
-        let report = runner.run(&line, GivenInput { scan, recording }, again, &mut || {})?;
-        to_json(&json!({
-            "job": report.job,
-            "id": report.id,
-            "result": report.result,
-            "was_there": report.was_there,
-            "failed": report.failed,
-            "summary": report.summary,
-        }))
-    })
+        Ok(JobRunner::new(folder, results).run(&line, GivenInput { scan, recording }, again, &mut || {})?)
+    })?;
+    let into = PyDict::new(py);
+    into.set_item("job", job)?;
+    into.set_item("id", id)?;
+    into.set_item("result", result)?;
+    into.set_item("was_there", was_there)?;
+    into.set_item("failed", failed)?;
+    into.set_item("summary", summary.to_string())?;
+    Ok(into)
 }
 
 /// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of those without a result.
 #[pyfunction]
-pub fn sweep_tables(py: Python<'_>, jobs: PathBuf, results: PathBuf, with_features: bool) -> PyResult<String> {
+#[pyo3(signature = (jobs, results, with_features))]
+pub fn sweep_tables(py: Python<'_>, jobs: PathBuf, results: Option<PathBuf>, with_features: bool) -> PyResult<String> {
     at_work(py, || {
+        let results = results.unwrap_or_else(|| JobsFile::folder(&jobs).join("results"));
         let SweepTables { jobs, features, missing, .. } = tables_of(&jobs, &results, with_features)?;
         to_json(&json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing }))
     })

@@ -34,11 +34,11 @@ def test_a_job_is_the_same_from_files_bytes_and_by_the_command(planned, touched_
     of_files = touchup.sweep.run_job(jobs, 0, planned / "by_files")
     given = {name: (touched_files / file).read_bytes() for name, file in (("scan", "scan.ply"), ("recording", "touch.mcap"))}
     of_bytes = touchup.sweep.run_job(jobs, 0, planned / "by_bytes", **given)
-    assert of_files["summary"] == of_bytes["summary"] == of_command["summary"]
-    assert not of_files["was_there"] and of_files["failed"] is None
-    results = [files(planned / place / of_files["id"]) for place in ("results", "by_files", "by_bytes")]
+    assert of_files.summary == of_bytes.summary == of_command["summary"]
+    assert not of_files.was_there and of_files.failed is None
+    results = [files(planned / place / of_files.id) for place in ("results", "by_files", "by_bytes")]
     assert results[0] == results[1] == results[2] and "refined.ply" in results[0]
-    assert touchup.sweep.run_job(jobs, 0, planned / "by_files")["was_there"]
+    assert touchup.sweep.run_job(jobs, 0, planned / "by_files").was_there
     with pytest.raises(touchup.TouchupError, match="not what was planned"):
         touchup.sweep.run_job(jobs, 1, planned / "by_bytes", scan=given["scan"] + b" ")
     with pytest.raises(touchup.TouchupError, match="has no job 2"):

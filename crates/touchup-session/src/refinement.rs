@@ -57,7 +57,13 @@ pub enum RefinementError {
     },
     /// The result cannot be made, or is the scan.
     #[error(transparent)]
-    Outcome(#[from] OutcomeError),
+    Outcome(Box<OutcomeError>),
+}
+
+impl From<OutcomeError> for RefinementError {
+    fn from(error: OutcomeError) -> Self {
+        Self::Outcome(error.into())
+    }
 }
 
 /// Scene and scan.

@@ -200,7 +200,7 @@ fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
         let NumberChange { name: of, a, b, change, plus_minus, moved } = number;
         let (what, unit) = in_words(of);
         let value = |value: &Option<f64>| value.map_or("–".to_owned(), plain);
-        vec![
+        let cells = vec![
             if at == 0 { name.clone() } else { String::new() },
             if at == 0 { place.clone() } else { String::new() },
             what,
@@ -209,7 +209,12 @@ fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
             format!("{} {unit}", if a.is_some() { signed(*change) } else { plain(*change) }),
             plus_minus.map_or("not known".to_owned(), plain),
             if *moved { chip("moves") } else { String::new() },
-        ]
+        ];
+        // the feature keeps its name and place
+        let soft = |(at, cell): (usize, String)| {
+            if *moved || at < 2 { cell } else { format!("<span class=\"still\">{cell}</span>") }
+        };
+        cells.into_iter().enumerate().map(soft).collect()
     };
     feature.numbers.iter().enumerate().map(row).collect()
 }
@@ -264,6 +269,7 @@ td { border-bottom: 1px solid #dfe3ea; padding: 5px 8px; vertical-align: top; } 
 .keys { width: auto; min-width: 50%; } .keys td:nth-child(n+2) { font-weight: 600; }
 .features td:nth-child(n+4):nth-child(-n+7), .features th:nth-child(n+4):nth-child(-n+7) { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 .features td:nth-child(-n+3), .features td:last-child { white-space: nowrap; }
+.still { color: #6b7280; }
 code { font: 13px ui-monospace, monospace; }
 .legend { display: flex; flex-wrap: wrap; gap: 6px 14px; align-items: center; font-size: 13px; color: #4a5160; }
 .legend span { display: inline-flex; align-items: center; gap: 5px; color: #1d2129; } .legend em { font-style: normal; }

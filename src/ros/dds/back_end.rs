@@ -1,7 +1,7 @@
 //! The node while it begins: topics, services and the action are added to it.
 
 use std::fmt::Debug;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, OnceLock};
 
 use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions};
@@ -34,12 +34,16 @@ impl<T, E: Debug> During<T> for Result<T, E> {
     }
 }
 
+/// The node once all is added to it, for topics whose type changes.
+pub(super) type BegunNode = Arc<OnceLock<Arc<Mutex<Node>>>>;
+
 /// Publishes, subscribes and serves.
 pub(super) struct DdsBackEnd<'a> {
     pub config: &'a NodeConfig,
     pub context: Context,
     pub node: Node,
-    pub graph: DdsGraph,
+    pub graph: Arc<Mutex<DdsGraph>>,
+    pub begun: BegunNode,
     pub exchange: Arc<Exchange>,
     pub room: Arc<Room>,
     /// of the services so far, absolute and remapped

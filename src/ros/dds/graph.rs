@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use ros2_client::dds::rustdds::mio1::event::Source;
@@ -17,6 +17,7 @@ use super::incoming::Listener;
 use super::keep_alive::{KeepAlive, LOOK_EVERY};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::Exchange;
+use crate::ros::locked;
 use crate::ros::port::Arrival;
 
 /// Vendors by their number on the wire: who knows one mapping of services alone.
@@ -27,6 +28,18 @@ const MOST_PARTICIPANTS: usize = 1024;
 /// Callers of services that are remembered.
 const MOST_CALLERS: usize = 4096;
 
+/// What others publish on one topic.
+#[derive(Default)]
+struct PublishedTypes {
+    /// how often that has changed
+    changes: u64,
+    /// as ROS 2 names them
+    writers: BTreeMap<GUID, String>,
+}
+
+/// Publishers of a topic of samples that are looked at.
+const MOST_WRITERS: usize = 64;
+
 pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
     /// `None` on this computer alone, where nobody is out of reach
@@ -36,6 +49,10 @@ pub(super) struct DdsGraph {
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
     topics: BTreeMap<String, (String, String)>,
+    /// types that others publish our topics of samples with
+    published: BTreeMap<String, PublishedTypes>,
+    /// why nothing of a topic can be read, by its name in ROS
+    unread: BTreeMap<String, String>,
     /// ROS names of our services
     pub services: Vec<String>,
     /// our readers and writers: ROS name of the topic, and who is matched
@@ -65,6 +82,8 @@ impl DdsGraph {
             mapping: mapping(config),
             own: participant.guid(),
             topics: BTreeMap::new(),
+            published: BTreeMap::new(),
+            unread: BTreeMap::new(),
             services: Vec::new(),
             matched: BTreeMap::new(),
             callers: BTreeMap::new(),
@@ -78,6 +97,37 @@ impl DdsGraph {
     pub fn add(&mut self, guid: GUID, topic: &Topic, name: String) {
         self.topics.insert(topic.name(), (name.clone(), topic.get_type().name().to_owned()));
         self.matched.insert(guid, (name, BTreeSet::new()));
+    }
+
+    /// The same is there no more.
+    pub fn remove(&mut self, guid: GUID) {
+        self.matched.remove(&guid);
+    }
+
+    /// From now on the types are noted that a topic is published with.
+    ///
+    /// - `topic`: as DDS names it.
+    pub fn watch_types(&mut self, topic: &str) {
+        self.published.entry(topic.to_owned()).or_default();
+    }
+
+    /// How often they have changed, and which they are now.
+    pub fn published_types(&self, topic: &str) -> Option<(u64, BTreeSet<String>)> {
+        let published = self.published.get(topic)?;
+        Some((published.changes, published.writers.values().cloned().collect()))
+    }
+
+    /// Why nothing of a topic can be read; reported when that is new.
+    pub fn set_unread(&mut self, name: &str, why: Option<String>) {
+        if self.unread.get(name) == why.as_ref() {
+            return;
+        }
+        match why {
+            Some(why) => drop(self.unread.insert(name.to_owned(), why)),
+            None => drop(self.unread.remove(name)),
+        }
+        let locals: Vec<_> = self.matched.iter().filter(|(_, (of, _))| of == name).map(|(guid, _)| *guid).collect();
+        locals.into_iter().for_each(|local| self.report(local, None));
     }
 
     /// How often it looks who is silent, where anybody may be.
@@ -100,6 +150,11 @@ impl DdsGraph {
                 self.callers.retain(|guid, _| guid.prefix != id);
                 self.reported.retain(|guid| guid.prefix != id);
                 self.unmatch(|guid| guid.prefix == id);
+            }
+            Event::WriterDetected { writer } if self.published.contains_key(&writer.topic_name) => {
+                if writer.guid.prefix != self.own.prefix {
+                    self.note_published(writer.guid, &writer.topic_name, &writer.type_name);
+                }
             }
             Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
                 self.seen(other.guid, &other.topic_name, &other.type_name);
@@ -132,7 +187,21 @@ impl DdsGraph {
         }
     }
 
+    fn note_published(&mut self, writer: GUID, topic: &str, type_name: &str) {
+        let Some(published) = self.published.get_mut(topic) else { return };
+        let type_name = ros_type(type_name);
+        let is_room = published.writers.len() < MOST_WRITERS || published.writers.contains_key(&writer);
+        if is_room && published.writers.insert(writer, type_name.clone()) != Some(type_name) {
+            published.changes += 1;
+        }
+    }
+
     fn unmatch(&mut self, is_gone: impl Fn(&GUID) -> bool) {
+        for published in self.published.values_mut() {
+            let count = published.writers.len();
+            published.writers.retain(|writer, _| !is_gone(writer));
+            published.changes += u64::from(published.writers.len() < count);
+        }
         let mut fewer = Vec::new();
         for (local, (_, others)) in &mut self.matched {
             let count = others.len();
@@ -189,9 +258,16 @@ impl DdsGraph {
 
     fn report(&self, local: GUID, mismatch: Option<String>) {
         if let Some((name, others)) = self.matched.get(&local) {
+            let mismatch = mismatch.or_else(|| self.unread.get(name).cloned());
             self.exchange.inbox.report(name.clone(), others.len(), mismatch);
         }
     }
+}
+
+/// The name of a type in ROS, of that which DDS has.
+fn ros_type(wire_name: &str) -> String {
+    let plain = wire_name.replace("::dds_::", "::");
+    plain.strip_suffix('_').unwrap_or(&plain).replace("::", "/")
 }
 
 /// The service of a topic of requests or answers.
@@ -214,17 +290,20 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
     }
 }
 
-impl Listener for DdsGraph {
+/// It is asked by the topics that follow what is published, on the same thread.
+impl Listener for Arc<Mutex<DdsGraph>> {
     fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
-        each(self.listener.as_status_source_mio1())?;
-        self.keep_alive.iter_mut().try_for_each(|keep_alive| each(&mut keep_alive.socket))
+        let mut graph = locked(self);
+        each(graph.listener.as_status_source_mio1())?;
+        graph.keep_alive.iter_mut().try_for_each(|keep_alive| each(&mut keep_alive.socket))
     }
 
     fn take(&mut self) {
-        while let Some(event) = self.listener.try_recv_status() {
-            self.on(event);
+        let mut graph = locked(self);
+        while let Some(event) = graph.listener.try_recv_status() {
+            graph.on(event);
         }
-        if let Some(keep_alive) = &mut self.keep_alive {
+        if let Some(keep_alive) = &mut graph.keep_alive {
             keep_alive.take();
         }
     }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -22,6 +21,11 @@ pub(super) trait Listener: Send {
 
     /// Takes all that is there.
     fn take(&mut self);
+
+    /// Whether other sources are to wake the thread from now on, as what others publish has changed.
+    fn has_changed(&mut self) -> bool {
+        false
+    }
 }
 
 /// Not the number of any listener.
@@ -59,6 +63,17 @@ pub(super) fn listen(
                     listener.take();
                 }
             }
+            for (token, listener) in listeners.iter_mut().enumerate() {
+                if !listener.has_changed() {
+                    continue;
+                }
+                let registry = poll.registry();
+                let heard = listener.sources(&mut |source| registry.register(source, Token(token), Interest::READABLE));
+                if let Err(error) = heard {
+                    tracing::error!(%error, "a topic is not heard");
+                }
+                listener.take();
+            }
             if look_every.is_some_and(|every| looked.elapsed() >= every) {
                 looked = Instant::now();
                 listeners.iter_mut().for_each(|listener| listener.take());
@@ -94,7 +109,7 @@ impl LastNumbers {
     const LARGEST: i64 = 1_000_000;
 
     /// How many are missing before this one.
-    fn missing(&mut self, sender: Gid, number: i64) -> u64 {
+    pub fn missing(&mut self, sender: Gid, number: i64) -> u64 {
         if self.0.len() >= Self::MOST && !self.0.contains_key(&sender) {
             self.0.pop_first();
         }
@@ -110,9 +125,6 @@ pub(super) struct HeardTopic<M: RosMessage> {
     pub subscription: Subscription<M>,
     pub exchange: Arc<Exchange>,
     pub arrival: fn(&Exchange, M) -> Arrival,
-    /// which of the two counters of what was lost on the way
-    pub counter: Option<usize>,
-    pub numbers: LastNumbers,
 }
 
 impl<M: RosMessage> Listener for HeardTopic<M> {
@@ -121,15 +133,11 @@ impl<M: RosMessage> Listener for HeardTopic<M> {
     }
 
     fn take(&mut self) {
-        let Self { name, subscription, exchange, arrival, counter, numbers } = self;
+        let Self { name, subscription, exchange, arrival } = self;
         drain(
             (name, exchange, ""),
             || subscription.take(),
-            |(message, info)| {
-                if let Some(counter) = *counter {
-                    let lost = numbers.missing(info.publisher_gid(), info.sequence_number());
-                    exchange.lost[counter].fetch_add(lost, Ordering::Relaxed);
-                }
+            |(message, _)| {
                 exchange.inbox.put(arrival(exchange, message));
             },
         );

@@ -12,13 +12,14 @@ mod graph;
 mod incoming;
 mod keep_alive;
 mod rosout;
+mod sample_topic;
 mod samples;
 mod services;
 mod sockets;
 mod topics;
 
 use std::sync::mpsc::sync_channel;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
@@ -26,11 +27,12 @@ use ros2_client::dds::rustdds;
 use ros2_client::{Node, NodeOptions};
 
 use self::answers::Room;
-use self::back_end::{DdsBackEnd, join};
+use self::back_end::{BegunNode, DdsBackEnd, join};
 use self::graph::{DdsGraph, mapping};
 use super::arguments::NodeConfig;
 use super::exchange::{self, Exchange, Joined, RosError};
 use super::inbox::Inbox;
+use super::locked;
 use super::parameter_services::{self, PublicParameters};
 use super::parameters::{PARAMETERS, ParameterValue, Parameters};
 use super::port::Port;
@@ -43,7 +45,7 @@ struct DdsConnection {
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
     /// its entities leave the graph when it goes
-    node: Option<Arc<Node>>,
+    node: Option<Arc<Mutex<Node>>>,
 }
 
 /// The network is left within this time, or as it is: RustDDS that is busy with what it received keeps no node from its end.
@@ -85,7 +87,8 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (context, node) = join(config, options)?;
     let mut back_end = DdsBackEnd {
         config,
-        graph: DdsGraph::new(&context, &exchange, config),
+        graph: Arc::new(Mutex::new(DdsGraph::new(&context, &exchange, config))),
+        begun: BegunNode::default(),
         context,
         node,
         exchange: exchange.clone(),
@@ -96,21 +99,20 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
     subscribe(config, &mut back_end)?;
     super::services::serve(&mut back_end, &Arc::new(exchange.inbox.clone()))?;
-    back_end.graph.services = back_end.names.clone();
-    let announcing = Arc::new(OnceLock::<Arc<Node>>::new());
-    let announce = announcing.clone();
+    locked(&back_end.graph).services = back_end.names.clone();
+    let announce = back_end.begun.clone();
     let announce = move |name: &str, value: &ParameterValue| {
-        if let Some(Err(reason)) = announce.get().map(|node| node.set_parameter(name, native(value))) {
+        if let Some(Err(reason)) = announce.get().map(|node| locked(node).set_parameter(name, native(value))) {
             tracing::warn!(name, reason, "a change of a parameter is not announced");
         }
     };
     parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
     let probe = action::server(&mut back_end)?;
-    let DdsBackEnd { node, graph, mut listeners, .. } = back_end;
+    let DdsBackEnd { node, graph, begun, mut listeners, .. } = back_end;
     listeners.push(probe);
-    let node = Arc::new(node);
-    announcing.get_or_init(|| node.clone());
-    let look_every = graph.look_every();
+    let node = Arc::new(Mutex::new(node));
+    begun.get_or_init(|| node.clone());
+    let look_every = locked(&graph).look_every();
     listeners.push(Box::new(graph));
     let (waker, listening) = incoming::listen(listeners, look_every, &exchange)?;
     let mut threads = vec![listening];

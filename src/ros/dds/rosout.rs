@@ -1,7 +1,7 @@
 //! `/rosout`: what the log says, for who watches the nodes of a cell.
 
-use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -12,12 +12,13 @@ use tracing::Level;
 
 use crate::log_lines::listen;
 use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::locked;
 
 /// It looks so often whether the port leaves.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Starts the thread that sends lines of the log, in the name of the node.
-pub(super) fn send(node: &Arc<Node>, exchange: &Arc<Exchange>) -> Result<JoinHandle<()>, RosError> {
+pub(super) fn send(node: &Arc<Mutex<Node>>, exchange: &Arc<Exchange>) -> Result<JoinHandle<()>, RosError> {
     let (node, lines) = (node.clone(), listen());
     // as loggers have it: `cell.touchup`
     let name = exchange.node_name.trim_start_matches('/').replace('/', ".");
@@ -26,7 +27,8 @@ pub(super) fn send(node: &Arc<Node>, exchange: &Arc<Exchange>) -> Result<JoinHan
             match lines.recv_timeout(LOOK_EVERY) {
                 Ok(line) => {
                     let stamp = Time::from_nanos(exchange.clock.now_ns());
-                    node.rosout_raw(stamp, level_of(line.level), &name, &line.text, line.file, "", line.line);
+                    let level = level_of(line.level);
+                    locked(&node).rosout_raw(stamp, level, &name, &line.text, line.file, "", line.line);
                 }
                 Err(RecvTimeoutError::Timeout) if !exchange.inbox.is_over() => {}
                 Err(_) => break,

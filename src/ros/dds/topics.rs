@@ -7,8 +7,9 @@ use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 use ros2_client::{MessageTypeName, Name, Node, WriteError};
 
 use super::back_end::{DdsBackEnd, During};
-use super::incoming::{HeardTopic, LastNumbers};
+use super::incoming::HeardTopic;
 use crate::ros::exchange::{Exchange, RosError};
+use crate::ros::locked;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::{Arrival, TILES_KEPT};
 use crate::ros::send_queue::Sent;
@@ -28,7 +29,7 @@ pub(super) const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
 /// Touches on their way at most, of 33 kB each: together they fit into the buffer that Linux gives a socket (212 kB).
 const TOUCHES_SENT: usize = 4;
 
-fn profile(topic: Topic) -> QosProfile {
+pub(super) fn profile(topic: Topic) -> QosProfile {
     let profile = match topic.is_reliable {
         false => BEST_EFFORT,
         true if [MESH, MESH_PATCH, PROBE_TOUCHES].contains(&topic) => PATIENT,
@@ -52,10 +53,12 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
             announced = limited(&announced, most)?;
         }
         let publisher = self.node.create_publisher::<M>(&announced, Some(profile)).during("publishing a topic")?;
-        self.graph.add(publisher.guid(), &announced, whole);
+        let mut graph = locked(&self.graph);
+        graph.add(publisher.guid(), &announced, whole);
         if topic == MESH {
-            self.graph.tiles = Some(publisher.guid());
+            graph.tiles = Some(publisher.guid());
         }
+        drop(graph);
         Ok(Box::new(move |message| match publisher.publish(message) {
             Ok(()) => Sent::Done,
             Err(WriteError::WouldBlock { data }) => Sent::Later(data),
@@ -73,10 +76,9 @@ impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
         let announced = make_topic::<M>(&self.node, &whole, &profile)?;
         let subscription = self.node.create_subscription::<M>(&announced, Some(profile));
         let subscription = subscription.during("subscribing to a topic")?;
-        self.graph.add(subscription.guid(), &announced, whole);
-        let counter = ["wrench", "pose"].iter().position(|sample| topic.name.ends_with(sample));
-        let (name, exchange, numbers) = (topic.name, self.exchange.clone(), LastNumbers::default());
-        self.listeners.push(Box::new(HeardTopic { name, subscription, exchange, arrival, counter, numbers }));
+        locked(&self.graph).add(subscription.guid(), &announced, whole);
+        let (name, exchange) = (topic.name, self.exchange.clone());
+        self.listeners.push(Box::new(HeardTopic { name, subscription, exchange, arrival }));
         Ok(())
     }
 }
@@ -97,7 +99,17 @@ pub(super) fn make_topic<M: RosMessage>(
     whole: &str,
     qos: &QosProfile,
 ) -> Result<rustdds::Topic, RosError> {
-    let mut parts = M::TYPE_NAME.split('/');
+    topic_of(M::TYPE_NAME, node, whole, qos)
+}
+
+/// - `type_name`: package, kind, name; `whole`: absolute, remapped.
+pub(super) fn topic_of(
+    type_name: &str,
+    node: &Node,
+    whole: &str,
+    qos: &QosProfile,
+) -> Result<rustdds::Topic, RosError> {
+    let mut parts = type_name.split('/');
     let (package, type_name) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
     node.create_topic(&dds_name(whole)?, MessageTypeName::new(package, type_name), qos).during("making a topic")
 }

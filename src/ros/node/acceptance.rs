@@ -120,6 +120,9 @@ pub fn meaning(reason: &str) -> &'static str {
         "no_frame" => "headers name no frame: fill frame_id at the source",
         "unknown_frame" => "their frame is in no transform: publish it on /tf or /tf_static",
         "transform" => "their frames are not connected at their stamps: look at /tf",
+        "transforms_apart" => {
+            "links up to pose_frame are published too far apart in time: publish them more often, or name other frames"
+        }
         "quaternion" => "orientations are no rotations: normalise the quaternion at its source",
         "stamp" => "stamps are no time between 1970 and 2038: look at the clock of the source",
         "duplicate" => "one stamp comes again and again: does the source fill header.stamp, and is it the only one?",

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 
 use crate::ros::clock::{self, time};
 use crate::ros::messages::{
-    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, Transform, TriggerResponse,
+    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, TransformStamped, TriggerResponse,
     Vector3 as Vector3Msg, Wrench as WrenchMsg, WrenchStamped,
 };
-use crate::stylus::{StampedPose, StampedWrench, Wrench, measured_rotation};
+use crate::stylus::{FrameTransform, StampedPose, StampedWrench, Wrench, measured_rotation};
 
 /// ns; `None` for what no message may have: before 1970, or nanoseconds that are a second or more.
 pub fn stamp_ns(time: &Time) -> Option<i64> {
@@ -26,11 +26,13 @@ pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), rotation))
 }
 
-/// A transform; `None` for one that is none.
-pub fn transform(transform: &Transform) -> Option<Isometry3<f64>> {
+/// A link of a tree of frames; `None` where its stamp is no time, or its orientation no rotation.
+pub fn frame_transform(stamped: &TransformStamped) -> Option<FrameTransform> {
+    let TransformStamped { header, child_frame_id, transform } = stamped;
     let Vector3Msg { x, y, z } = transform.translation;
     let pose = isometry(&Pose { position: Point { x, y, z }, orientation: transform.rotation })?;
-    pose.translation.vector.iter().all(|x| x.is_finite()).then_some(pose)
+    let (stamp_ns, parent, child) = (stamp_ns(&header.stamp)?, header.frame_id.clone(), child_frame_id.clone());
+    Some(FrameTransform { stamp_ns, parent, child, pose })
 }
 
 /// As a message has it.

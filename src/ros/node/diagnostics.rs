@@ -69,6 +69,14 @@ impl RefinementWorker {
                 format!("waits, and something comes (unreadable): {}", meaning("unreadable")),
             );
         }
+        let unread = self.unread_topics();
+        if !unread.is_empty() {
+            return (DiagnosticStatus::ERROR, format!("cannot read what is published: {}", unread.join("; ")));
+        }
+        let missing = self.moving.as_ref().filter(|_| self.streams[0].arrived == 0);
+        if let Some(why) = missing.and_then(|moving| moving.missing(&self.resolver.frames)) {
+            return (DiagnosticStatus::WARN, format!("waits, frames are not connected: {why}"));
+        }
         if self.streams.iter().all(|stream| stream.arrived == 0) {
             return (DiagnosticStatus::STALE, "waits: neither pose nor wrench has come yet".to_owned());
         }
@@ -83,6 +91,14 @@ impl RefinementWorker {
             return (DiagnosticStatus::WARN, format!("holds, a stream is stale: {}", ages.join(", ")));
         }
         self.state_of_samples(now)
+    }
+
+    /// Sensor topics that others publish and of which nothing has come, each with the reason.
+    fn unread_topics(&self) -> Vec<String> {
+        let [wrench, pose] = self.port.sample_topics();
+        let silent = [(pose, 0), (wrench, 1)].into_iter().filter(|(_, stream)| self.streams[*stream].arrived == 0);
+        let why = silent.filter_map(|(topic, _)| Some((topic, self.endpoints.get(topic)?.mismatch.as_ref()?)));
+        why.map(|(topic, why)| format!("{topic}, {why}")).collect()
     }
 
     /// What becomes of the samples while both streams come.
@@ -200,6 +216,10 @@ impl RefinementWorker {
                 value(&format!("{name}_age_ms"), age),
                 value(&format!("{name}_gaps"), stream.gaps),
             ]);
+        }
+        if let Some(moving) = &self.moving {
+            values.push(value("poses_interpolated", moving.interpolated));
+            values.push(value("transforms_outside", moving.outside));
         }
         let ([wrenches, poses], [dropped, others], [tiles, unsent]) = (report.lost, report.dropped, report.unsent);
         let counts = [

@@ -7,9 +7,10 @@
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::convert::{isometry, stamp_ns, vector_of};
-use super::frames::{FrameBuffer, FrameError, plain_name};
 use crate::ros::messages::{PoseStamped, WrenchStamped};
-use crate::stylus::{Message, Placement, StampedPose, StampedWrench, Wrench, WrenchFrame};
+use crate::stylus::{
+    FrameBuffer, FrameError, Message, Placement, StampedPose, StampedWrench, Wrench, WrenchFrame, plain_name,
+};
 
 /// Frame of the poses where the scene says where the scan lies in it.
 pub const CELL: &str = "cell";
@@ -166,6 +167,7 @@ impl FrameResolver {
 mod tests {
     use nalgebra::{Vector3, vector};
 
+    use super::super::convert::frame_transform;
     use super::*;
     use crate::ros::messages::{
         Header, Point, Pose, Quaternion, Time, Transform, TransformStamped, Vector3 as V, Wrench as W,
@@ -196,7 +198,7 @@ mod tests {
         };
         for (parent, child) in [("object", "base"), ("stylus_sensor", "gauge")] {
             let stamped = TransformStamped { header: header(parent), child_frame_id: child.to_owned(), transform };
-            assert!(resolver.frames.insert(&stamped, true));
+            assert!(resolver.frames.insert(&frame_transform(&stamped).unwrap(), true));
         }
         resolver
     }

@@ -13,11 +13,10 @@ use tracing::warn;
 use super::acceptance::Acceptance;
 use super::arm::ArmHandle;
 use super::channels::{FeatureInput, ViewInput};
-use super::convert::stamp_ns;
+use super::convert::{as_pose, frame_transform, stamp_ns};
 use super::doubts::InputDoubts;
 use super::error::NodeError;
 use super::frame_resolver::{FrameNames, FrameResolver, Refusal};
-use super::frames::FrameError;
 use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
@@ -31,7 +30,7 @@ use crate::ros::inbox::Arrivals;
 use crate::ros::messages::{PoseStamped, TFMessage, WrenchStamped};
 use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::ros::stop::StopState;
-use crate::stylus::{Message, Sample, WrenchFrame};
+use crate::stylus::{FrameError, FrameTransform, Message, MovingFrame, Sample, WrenchFrame};
 
 /// The loop looks at the streams so often when nothing comes.
 const IDLE: Duration = Duration::from_millis(10);
@@ -82,6 +81,8 @@ pub struct RefinementWorker {
     /// to be filled again
     pub(super) kept: Option<Box<Edits>>,
     pub(super) resolver: FrameResolver,
+    /// the frame whose pose is that of the stylus, where it is taken from transforms
+    pub(super) moving: Option<MovingFrame>,
     pub(super) session: NodeSession,
     /// poses and wrenches that wait for a transform, with when they came
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
@@ -132,6 +133,7 @@ impl RefinementWorker {
             taking_out: None,
             variance: VarianceWork::default(),
             doubts: InputDoubts::on(&setup.clock),
+            moving: setup.pose_frames.as_ref().map(|[frame, base]| MovingFrame::new(frame, base)),
             resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
             setup,
             port,
@@ -220,12 +222,26 @@ impl RefinementWorker {
     }
 
     fn transforms(&mut self, message: &TFMessage, is_static: bool) {
-        for transform in &message.transforms {
-            if !self.resolver.frames.insert(transform, is_static) {
-                self.session.counters.refuse("bad_transform");
-            }
+        let links: Vec<FrameTransform> = message.transforms.iter().filter_map(frame_transform).collect();
+        let frames = &mut self.resolver.frames;
+        let refused = match &mut self.moving {
+            Some(moving) => moving.push(frames, &links, is_static),
+            None => links.iter().filter(|link| !frames.insert(link, is_static)).count() as u64,
+        };
+        let refused = refused + (message.transforms.len() - links.len()) as u64;
+        (0..refused).for_each(|_| self.session.counters.refuse("bad_transform"));
+        while let Some(pose) = self.next_moving_pose() {
+            self.message(ArrivedMessage::Pose(pose), self.setup.clock.now());
         }
         self.retry_waiting();
+    }
+
+    /// The next pose that the transforms give.
+    fn next_moving_pose(&mut self) -> Option<PoseStamped> {
+        let moving = self.moving.as_mut()?;
+        let pose = moving.next_pose(&self.resolver.frames);
+        (0..moving.take_apart()).for_each(|_| self.session.counters.refuse("transforms_apart"));
+        pose.map(|pose| as_pose(&pose, moving.base()))
     }
 
     fn message(&mut self, message: ArrivedMessage, at: Instant) {

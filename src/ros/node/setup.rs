@@ -30,6 +30,8 @@ pub(crate) struct Setup {
     pub topics: Topics,
     pub source: &'static str,
     pub tool: String,
+    /// whose pose is taken from transforms, and in which frame
+    pub pose_frames: Option<[String; 2]>,
 }
 
 impl Setup {
@@ -48,9 +50,10 @@ impl Setup {
         let tree = FaceTree::new(&mesh);
         let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
         let tool = match parameters.string("tool_frame") {
-            "" => source.to_owned(),
+            "" => parameters.pose_frames().map_or(source, |[frame, _]| frame).to_owned(),
             named => named.to_owned(),
         };
+        let pose_frames = parameters.pose_frames().map(|frames| frames.map(str::to_owned));
         let known = scene.patcher_params().and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         let replica = MeshReplica::new(clock.clone(), &mesh);
@@ -66,6 +69,7 @@ impl Setup {
             topics: Topics { pose: format!("/{source}/pose"), wrench: format!("/{source}/wrench"), markers: None },
             source,
             tool,
+            pose_frames,
         })
     }
 }

@@ -8,8 +8,9 @@ use super::convert::Convert;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
+use crate::ros::sample_source::SampleSource;
 use crate::ros::send_queue::Sent;
-use crate::ros::topics::{MESH, Publisher, Publishes, Subscribes, Topic};
+use crate::ros::topics::{MESH, Publisher, Publishes, Subscribes, SubscribesSamples, Topic};
 
 pub(super) fn profile(topic: Topic) -> QosProfile {
     let profile = if topic.is_reliable { QosProfile::default().reliable() } else { QosProfile::sensor_data() };
@@ -47,6 +48,31 @@ where
         let exchange = self.exchange.clone();
         self.sources.push(source(messages, move |message| {
             exchange.inbox.put(arrival(&exchange, M::ours(message)));
+        }));
+        Ok(())
+    }
+}
+
+impl SubscribesSamples for R2rBackEnd<'_> {
+    /// With the type of who publishes when the node begins, if none is named: r2r finds the code for a type by its name, where it was built with it.
+    fn subscribe_samples(&mut self, topic: Topic, samples: SampleSource) -> Result<(), RosError> {
+        let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
+        let known = self.node.get_publishers_info_by_topic(&whole, false).unwrap_or_default();
+        let published = known.iter().map(|sender| sender.topic_type.as_str());
+        let (of, unread) = samples.choose(samples.first_type(), published);
+        if let Some(why) = unread {
+            tracing::warn!(topic = whole, "{why}");
+        }
+        let messages = self.node.subscribe_raw(topic.name, of.name(), profile.clone());
+        let messages = messages.during("subscribing to a topic")?;
+        self.graph.watch_senders(whole, of.name(), profile);
+        let (name, exchange) = (topic.name, self.exchange.clone());
+        self.sources.push(source(messages, move |payload: Vec<u8>| {
+            let arrival = match of.decode(&payload, exchange.clock.now_ns()) {
+                Ok(read) => samples.arrival(read),
+                Err(bad) => Arrival::Unreadable(name, format!("{bad}, read as {}", of.name())),
+            };
+            exchange.inbox.put(arrival);
         }));
         Ok(())
     }

@@ -19,7 +19,7 @@ fn row(declared: &ParameterDescriptor) -> [String; 6] {
     let range = match declared.allowed {
         Allowed::Double(_, from, to) => format!("{from} to {to}"),
         Allowed::OneOf(_, words) => words.join(", "),
-        Allowed::Bool(_) | Allowed::String(_) => String::new(),
+        Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => String::new(),
     };
     let default = declared.default_value();
     let live = match declared.settable {
@@ -45,9 +45,9 @@ fn documented() -> Vec<[String; 6]> {
 #[test]
 fn the_table_is_that_of_the_documentation() {
     let declared = PARAMETERS.iter().filter(|declared| declared.name != EVERYWHERE);
-    // "a file" and "a folder" say what a word means, not what it may be
+    // "a file", "a folder" and "a type" say what a word means, not what it may be
     let documented = documented().into_iter().map(|mut row| {
-        row[3] = row[3].replace("a file", "").replace("a folder", "");
+        row[3] = row[3].replace("a file", "").replace("a folder", "").replace("a type", "");
         row
     });
     assert_eq!(declared.map(row).collect::<Vec<_>>(), documented.collect::<Vec<_>>());

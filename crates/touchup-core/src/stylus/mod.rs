@@ -5,7 +5,8 @@
 //! [`ContactEstimator`] makes of each sample, once for all its users, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
 //! turns the force into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
 //! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented. [`TipBody`] finds the point of the tip that
-//! touches, [`LocalMotion`] the motion around one instant.
+//! touches, [`LocalMotion`] the motion around one instant. Where the pose is not published as such, [`MovingFrame`] takes it from the transforms of a
+//! [`FrameBuffer`].
 
 mod bias;
 mod clock;
@@ -15,10 +16,12 @@ mod contact;
 mod contact_estimator;
 mod course_clock;
 mod force_noise;
+mod frame_buffer;
 mod free_motion;
 mod friction;
 mod local_motion;
 mod markers;
+mod moving_frame;
 mod placement;
 mod probed;
 mod stream;
@@ -35,12 +38,14 @@ pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
 pub(crate) use force_noise::ForceNoise;
+pub use frame_buffer::{FrameBuffer, FrameError, FrameTransform, plain_name};
 pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding, WIDEST_CONE_COSINE};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
     MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, SpringParams,
     Tracking,
 };
+pub use moving_frame::MovingFrame;
 pub use placement::Placement;
 pub use probed::ProbedPoint;
 pub use sync::Synchroniser;

@@ -1,6 +1,6 @@
 //! What becomes of the messages and rows of a recording: records, or counts of what cannot be used.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
 use super::cdr::unpack;
@@ -17,8 +17,8 @@ use touchup_core::stylus::Message;
 pub(super) struct Intake {
     pub pose_frame: Option<String>,
     pub wrench_frame: Option<String>,
-    /// of a message that holds both, what comes behind the first
-    pub second: Option<Record>,
+    /// of a message that gives several, what comes behind the first
+    pub others: VecDeque<Record>,
     /// where the pose comes from transforms
     chain: Option<TransformChain>,
     pub bad: BTreeMap<BadMessage, BadCount>,
@@ -31,7 +31,7 @@ impl Intake {
     }
 
     pub fn take_chain(&mut self, chain: TransformChain) {
-        self.pose_frame = Some(chain.base.clone());
+        self.pose_frame = Some(chain.poses.base().to_owned());
         self.chain = Some(chain);
     }
 
@@ -41,7 +41,26 @@ impl Intake {
             let holds = [raw.kind != TopicKind::Wrench, matches!(raw.kind, TopicKind::Wrench | TopicKind::State)];
             self.leave_out(reason, holds, path, raw.place);
         }
+        if raw.kind == TopicKind::Transforms {
+            self.count_apart(path, raw.place);
+        }
         decoded.ok().flatten()
+    }
+
+    /// The recording is at its end: what waits for transforms gets none.
+    pub fn finish(&mut self) {
+        self.chain.iter_mut().for_each(|chain| chain.poses.finish());
+    }
+
+    /// Poses for which transforms were interpolated, and stamps outside of what the transforms cover.
+    pub fn transform_counts(&self) -> Option<[u64; 2]> {
+        self.chain.as_ref().map(|chain| [chain.poses.interpolated, chain.poses.outside])
+    }
+
+    /// Counts the stamps of which the transforms give no pose.
+    fn count_apart(&mut self, path: &Path, place: FilePlace) {
+        let apart = self.chain.as_mut().map_or(0, |chain| chain.poses.take_apart());
+        (0..apart).for_each(|_| self.leave_out(BadMessage::TransformsApart, [true, false], path, place));
     }
 
     /// Pose and wrench of a row of a table.
@@ -50,7 +69,7 @@ impl Intake {
             Ok(TableRow { pose, wrench }) => {
                 let wrench = wrench.map(|wrench| Record::from(Message::Wrench(wrench)));
                 let Some(pose) = pose else { return wrench };
-                self.second = wrench;
+                self.others.extend(wrench);
                 Some(Message::Pose(pose).into())
             }
             Err(reason) => {
@@ -69,10 +88,9 @@ impl Intake {
     }
 
     fn decode(&mut self, raw: &RawMessage, stamps: StampSource) -> Result<Option<Record>, BadMessage> {
+        let logged_ns = (stamps == StampSource::Log).then_some(raw.logged_ns);
         let stamped = |mut record: Record| {
-            if stamps == StampSource::Log {
-                record.set_stamp(raw.logged_ns);
-            }
+            logged_ns.into_iter().for_each(|logged_ns| record.set_stamp(logged_ns));
             record
         };
         match decode_raw(raw)? {
@@ -82,16 +100,31 @@ impl Intake {
                 in_one_frame(first, &frame)?;
                 Ok(Some(stamped(record)))
             }
-            Decoded::State(frame, pose, wrench) => {
-                in_one_frame(&mut self.pose_frame, &frame)?;
-                self.wrench_frame = Some(frame);
-                self.second = Some(stamped(Message::Wrench(wrench).into()));
+            Decoded::State(state) => {
+                let pose = (raw.kind != TopicKind::Wrench).then_some(state.pose);
+                let wrench = (raw.kind != TopicKind::Pose).then_some(state.wrench);
+                if pose.is_some() {
+                    in_one_frame(&mut self.pose_frame, &state.pose_frame)?;
+                }
+                if wrench.is_some() {
+                    in_one_frame(&mut self.wrench_frame, &state.wrench_frame)?;
+                }
+                let wrench = wrench.map(|wrench| stamped(Message::Wrench(wrench).into()));
+                let Some(pose) = pose else { return Ok(wrench) };
+                self.others.extend(wrench);
                 Ok(Some(stamped(Message::Pose(pose).into())))
             }
             Decoded::Transforms(links) => {
                 let Some(chain) = &mut self.chain else { return Ok(None) };
-                let pose = chain.push(links, raw.kind == TopicKind::StaticTransforms)?;
-                Ok(pose.map(|pose| stamped(Message::Pose(pose).into())))
+                // of several stamps the newest is the one that was recorded now
+                let newest_ns = links.iter().map(|link| link.stamp_ns).max().unwrap_or_default();
+                let shift_ns = logged_ns.map_or(0, |logged_ns| logged_ns.saturating_sub(newest_ns));
+                chain.push(links, raw.kind == TopicKind::StaticTransforms)?;
+                while let Some(mut pose) = chain.next_pose() {
+                    pose.stamp_ns = pose.stamp_ns.saturating_add(shift_ns);
+                    self.others.push_back(Message::Pose(pose).into());
+                }
+                Ok(self.others.pop_front())
             }
         }
     }

@@ -146,12 +146,13 @@ impl TopicKind {
         match self {
             Self::Pose => {
                 "geometry_msgs/msg/PoseStamped or another pose (PoseWithCovarianceStamped, TransformStamped, Odometry, Pose, \
-                 FrankaState, iiwa_msgs' CartesianPose)"
+                 FrankaState, FrankaRobotState, iiwa_msgs' CartesianPose)"
             }
             Self::Wrench => {
-                "geometry_msgs/msg/WrenchStamped or another wrench (Wrench, FrankaState, iiwa_msgs' CartesianWrench)"
+                "geometry_msgs/msg/WrenchStamped or another wrench (Wrench, FrankaState, FrankaRobotState, iiwa_msgs' \
+                 CartesianWrench)"
             }
-            Self::State => "franka_msgs/msg/FrankaState, the only one that holds both pose and wrench",
+            Self::State => "franka_msgs' FrankaState or FrankaRobotState, the only ones that hold both pose and wrench",
             Self::Markers | Self::Transforms | Self::StaticTransforms => self.type_name(),
         }
     }

@@ -15,38 +15,55 @@ pub(super) enum MessageType {
     Wrench,
     WrenchStamped,
     FrankaState,
+    FrankaRobotState,
     IiwaPose,
     IiwaWrench,
     PointCloud,
 }
 
-/// Each by its name without `/msg`, which ROS 1 does not have.
-const NAMES: [(&str, MessageType); 12] = [
-    ("geometry_msgs/PoseStamped", MessageType::PoseStamped),
-    ("geometry_msgs/Pose", MessageType::Pose),
-    ("geometry_msgs/PoseWithCovarianceStamped", MessageType::PoseWithCovarianceStamped),
-    ("nav_msgs/Odometry", MessageType::Odometry),
-    ("geometry_msgs/TransformStamped", MessageType::TransformStamped),
-    ("tf2_msgs/TFMessage", MessageType::Transforms),
-    ("geometry_msgs/WrenchStamped", MessageType::WrenchStamped),
-    ("geometry_msgs/Wrench", MessageType::Wrench),
-    ("franka_msgs/FrankaState", MessageType::FrankaState),
-    ("iiwa_msgs/CartesianPose", MessageType::IiwaPose),
-    ("iiwa_msgs/CartesianWrench", MessageType::IiwaWrench),
-    ("sensor_msgs/PointCloud2", MessageType::PointCloud),
+/// Each by its name; those of ROS 1 have no `msg` in theirs.
+const NAMES: [(&str, MessageType); 13] = [
+    ("geometry_msgs/msg/PoseStamped", MessageType::PoseStamped),
+    ("geometry_msgs/msg/Pose", MessageType::Pose),
+    ("geometry_msgs/msg/PoseWithCovarianceStamped", MessageType::PoseWithCovarianceStamped),
+    ("nav_msgs/msg/Odometry", MessageType::Odometry),
+    ("geometry_msgs/msg/TransformStamped", MessageType::TransformStamped),
+    ("tf2_msgs/msg/TFMessage", MessageType::Transforms),
+    ("geometry_msgs/msg/WrenchStamped", MessageType::WrenchStamped),
+    ("geometry_msgs/msg/Wrench", MessageType::Wrench),
+    ("franka_msgs/msg/FrankaState", MessageType::FrankaState),
+    ("franka_msgs/msg/FrankaRobotState", MessageType::FrankaRobotState),
+    ("iiwa_msgs/msg/CartesianPose", MessageType::IiwaPose),
+    ("iiwa_msgs/msg/CartesianWrench", MessageType::IiwaWrench),
+    ("sensor_msgs/msg/PointCloud2", MessageType::PointCloud),
 ];
 
 impl MessageType {
     fn named(type_name: &str) -> Option<Self> {
-        let plain = type_name.replacen("/msg/", "/", 1);
-        // before tf2 ROS 1 had a type of its own, with the same fields
-        let plain = if plain == "tf/tfMessage" { "tf2_msgs/TFMessage" } else { &plain };
-        NAMES.iter().find(|(name, _)| *name == plain).map(|(_, message_type)| *message_type)
+        let ros2 = match type_name.split_once('/') {
+            // before tf2 ROS 1 had a type of its own, with the same fields
+            Some(("tf", "tfMessage")) => "tf2_msgs/msg/TFMessage".to_owned(),
+            Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),
+            _ => type_name.to_owned(),
+        };
+        NAMES.iter().find(|(name, _)| *name == ros2).map(|(_, message_type)| *message_type)
+    }
+
+    /// As ROS 2 has it.
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
+    }
+
+    /// Whether stamp and frame are those of its header.
+    pub fn has_header(self) -> bool {
+        !matches!(self, Self::Pose | Self::Wrench)
     }
 
     fn gives(self, kind: TopicKind) -> bool {
         match (kind, self) {
-            (TopicKind::Pose | TopicKind::Wrench | TopicKind::State, Self::FrankaState) => true,
+            (TopicKind::Pose | TopicKind::Wrench | TopicKind::State, Self::FrankaState | Self::FrankaRobotState) => {
+                true
+            }
             (TopicKind::State, _) => false,
             (TopicKind::Transforms | TopicKind::StaticTransforms, given) => given == Self::Transforms,
             (TopicKind::Markers, given) => given == Self::PointCloud,
@@ -62,6 +79,19 @@ impl MessageType {
             ),
         }
     }
+
+    /// The type of a topic that is to give what `kind` says; the error is what the topic is instead, and what to do.
+    ///
+    /// - `frame`, `topic`: what names the frame of the stylus, and what chooses another topic.
+    pub fn giving(kind: TopicKind, type_name: &str, frame: &str, topic: &str) -> Result<Self, String> {
+        match Self::named(type_name) {
+            Some(given) if given.gives(kind) => Ok(given),
+            Some(Self::Transforms) if kind == TopicKind::Pose => {
+                Err(format!("{type_name}, which holds many frames; name that of the stylus with {frame}"))
+            }
+            _ => Err(format!("{type_name}, not {}; choose another with {topic}", kind.types())),
+        }
+    }
 }
 
 /// How a topic is read.
@@ -74,18 +104,14 @@ pub(super) struct MessageFormat {
 impl MessageFormat {
     /// That of a topic which is to give what `kind` says; the error is what the topic is instead, and what to do.
     pub fn of(info: &TopicInfo, kind: TopicKind) -> Result<Self, String> {
-        let named = MessageType::named(&info.type_name);
-        let (type_name, flag) = (&info.type_name, kind.flag());
-        match (named.filter(|given| given.gives(kind)), Wire::of(&info.encoding)) {
-            (Some(MessageType::PointCloud), Some(Wire::Ros1)) => {
+        let type_name = &info.type_name;
+        let message_type = MessageType::giving(kind, type_name, "--pose-frame", kind.flag())?;
+        match (message_type, Wire::of(&info.encoding)) {
+            (MessageType::PointCloud, Some(Wire::Ros1)) => {
                 Err(format!("{type_name} of ROS 1; convert the recording with `rosbags-convert` to read markers"))
             }
-            (Some(message_type), Some(wire)) => Ok(Self { message_type, wire }),
-            (Some(_), None) => Err(format!("encoded as {:?}; only ROS 2's \"cdr\" can be read", info.encoding)),
-            (None, _) if named == Some(MessageType::Transforms) && kind == TopicKind::Pose => {
-                Err(format!("{type_name}, which holds many frames; name that of the stylus with --pose-frame"))
-            }
-            (None, _) => Err(format!("{type_name}, not {}; choose another with {flag}", kind.types())),
+            (_, Some(wire)) => Ok(Self { message_type, wire }),
+            (_, None) => Err(format!("encoded as {:?}; only ROS 2's \"cdr\" can be read", info.encoding)),
         }
     }
 }

@@ -1,31 +1,21 @@
 //! A recording as one sequence of messages, whatever it is kept in.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::fs::File;
-use std::io::{self, Read};
 use std::iter::FusedIterator;
 use std::path::{Path, PathBuf};
 
-use super::bag::BagReader;
-use super::bag_index;
 use super::columns::WrenchAxes;
-use super::db3::{self, Db3Reader};
-use super::decode::Decoded;
 use super::error::BadCount;
 use super::folder::files_of;
-use super::intake::{Intake, decode_raw};
-use super::mcap::{self, McapReader};
+use super::intake::Intake;
 use super::number_table::{NumberTable, is_table};
-use super::topics::check_topics;
-use super::transforms::TransformTree;
-use super::{
-    BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource, TopicInfo, TopicKind,
-    TransformFrames, ZSTD_MAGIC,
-};
+use super::opening::open_file;
+use super::{BadMessage, Record, RecordingError, RecordingFile, RecordingLayout, StampSource};
 use touchup_core::numeric::counted;
 use touchup_core::stylus::Message;
 
-const ROS1_MAGIC: &[u8] = b"#ROSBAG V";
+mod survey;
+
 /// Frames of a table, which names none.
 const TABLE_FRAMES: [&str; 2] = ["object", "stylus"];
 
@@ -145,6 +135,12 @@ impl RecordingReader {
         &self.intake.bad
     }
 
+    /// Where the pose is taken from transforms: poses so far for which a link was interpolated, and stamps without a pose before the first or
+    /// behind the last transform of a link.
+    pub fn transform_counts(&self) -> Option<[u64; 2]> {
+        self.intake.transform_counts()
+    }
+
     /// What a better recording would not lack, a line each: messages left out, and a lost end.
     pub fn losses(&self) -> Vec<String> {
         let line = |(reason, bad): (&BadMessage, &BadCount)| {
@@ -169,49 +165,6 @@ impl RecordingReader {
         self.truncated
     }
 
-    /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
-    fn survey(&mut self) -> Result<Option<Box<dyn RecordingFile>>, RecordingError> {
-        let mut first = None;
-        let mut found: Vec<TopicInfo> = Vec::new();
-        let mut first_damage = None;
-        for file in &self.rest {
-            let (source, damage) = open_file(file, &self.layout)?;
-            first_damage = first_damage.or(damage);
-            self.truncated |= source.truncated();
-            self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
-            found.extend(source.topics());
-            found.sort_unstable();
-            found.dedup();
-            first = first.or(Some(source));
-        }
-        match (check_topics(&self.path, &self.layout, &found), first_damage) {
-            (Err(RecordingError::MissingTopic { .. }), Some(damage)) => Err(damage),
-            (checked, _) => checked.map(|()| first),
-        }
-    }
-
-    /// The tree of transforms as far as it is needed; of what is damaged, what comes before.
-    fn read_tree(mut self, frames: &TransformFrames) -> TransformTree {
-        let mut tree = TransformTree::default();
-        while !tree.is_enough(frames)
-            && let Some(source) = &mut self.source
-        {
-            match source.next_message() {
-                Ok(Some(raw)) => {
-                    if let Ok(Decoded::Transforms(links)) = decode_raw(&raw) {
-                        tree.add(links, raw.kind == TopicKind::StaticTransforms);
-                    }
-                }
-                Ok(None) => {
-                    let next = self.rest.pop_front().and_then(|path| open_file(&path, &self.layout).ok());
-                    self.source = next.map(|(source, _)| source);
-                }
-                Err(_) => break,
-            }
-        }
-        tree
-    }
-
     /// The next pose, wrench or frame of markers; after damage the error, then `None`.
     pub fn next_record(&mut self) -> Option<Result<Record, RecordingError>> {
         let next = self.advance();
@@ -225,8 +178,8 @@ impl RecordingReader {
 
     fn advance(&mut self) -> Result<Option<Record>, RecordingError> {
         loop {
-            if let Some(second) = self.intake.second.take() {
-                return Ok(Some(second));
+            if let Some(other) = self.intake.others.pop_front() {
+                return Ok(Some(other));
             }
             if let Some(table) = &mut self.table {
                 let Some(row) = table.next_row()? else { return Ok(None) };
@@ -244,7 +197,10 @@ impl RecordingReader {
             }
             self.truncated |= source.truncated();
             self.source = None;
-            let Some(path) = self.rest.pop_front() else { return Ok(None) };
+            let Some(path) = self.rest.pop_front() else {
+                self.intake.finish();
+                return Ok(None);
+            };
             self.source = Some(open_file(&path, &self.layout)?.0);
             self.path = path;
         }
@@ -264,47 +220,3 @@ impl Iterator for RecordingReader {
 }
 
 impl FusedIterator for RecordingReader {}
-
-/// Opens one file of a recording; with the damage that was met on the search for its topics.
-fn open_file(
-    path: &Path,
-    layout: &RecordingLayout,
-) -> Result<(Box<dyn RecordingFile>, Option<RecordingError>), RecordingError> {
-    let io = |source| RecordingError::Io { path: path.to_owned(), source };
-    let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
-    let packed = front.starts_with(&ZSTD_MAGIC);
-    if packed {
-        let unpacked = zstd::Decoder::new(File::open(path).map_err(io)?).and_then(read_front);
-        front = unpacked.map_err(io)?;
-    }
-    if front.starts_with(&mcap::MAGIC) {
-        let (reader, damage) = McapReader::open(path, layout, packed)?;
-        Ok((Box::new(reader), damage))
-    } else if front == db3::MAGIC {
-        Ok((Box::new(Db3Reader::open(path, layout, packed)?), None))
-    } else if front.starts_with(bag_index::MAGIC) && !packed {
-        let (reader, damage) = BagReader::open(path, layout)?;
-        Ok((Box::new(reader), damage))
-    } else {
-        Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
-    }
-}
-
-fn read_front(input: impl Read) -> io::Result<Vec<u8>> {
-    let mut front = Vec::new();
-    input.take(db3::MAGIC.len() as u64).read_to_end(&mut front)?;
-    Ok(front)
-}
-
-fn describe_front(front: &[u8]) -> String {
-    if front.is_empty() {
-        "the file is empty".to_owned()
-    } else if front.starts_with(ROS1_MAGIC) {
-        "it is a ROS 1 bag of another version than 2.0, or packed as a whole; unpack it, or convert it with `rosbags-convert`".to_owned()
-    } else {
-        format!(
-            "it begins with \"{}\", neither MCAP nor rosbag2's SQLite nor a ROS 1 bag; a table must end in .csv, .tsv, .txt or .log",
-            front.escape_ascii()
-        )
-    }
-}

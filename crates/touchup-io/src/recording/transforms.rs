@@ -1,16 +1,15 @@
 //! The pose of one frame in another, from a tree of transforms as `/tf` and `/tf_static` publish it.
 //!
-//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; links that stay count at any time, those that move are taken together
-//! only when their stamps are equal, as robot_state_publisher sends them: nothing is interpolated here.
+//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; links that stay count at any time, those that move are brought to one
+//! instant by [`MovingFrame`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use super::decode::Transform;
 use super::{BadMessage, RecordingError, TransformFrames};
-use touchup_core::stylus::StampedPose;
+use touchup_core::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose};
 
 /// Frames of a tree: an arm has ten, a plant some hundred.
 const MOST_FRAMES: usize = 10_000;
@@ -35,9 +34,9 @@ struct TreeLink {
 
 impl TransformTree {
     /// Takes in the links of one message.
-    pub fn add(&mut self, transforms: Vec<Transform>, are_static: bool) {
+    pub fn add(&mut self, transforms: Vec<FrameTransform>, are_static: bool) {
         self.messages += u64::from(!are_static);
-        for Transform { parent, child, pose, .. } in transforms {
+        for FrameTransform { parent, child, pose, .. } in transforms {
             if self.links.len() < MOST_FRAMES || self.links.contains_key(&child) {
                 self.links.insert(child, TreeLink { parent, fixed: are_static.then_some(pose) });
             }
@@ -57,14 +56,7 @@ impl TransformTree {
         while frames.base.as_ref() != Some(&at) && links.len() <= self.links.len() {
             match self.links.get(&at) {
                 Some(TreeLink { parent, fixed }) => {
-                    let pose = fixed.unwrap_or_default();
-                    links.push(ChainLink {
-                        child: at,
-                        parent: parent.clone(),
-                        pose,
-                        stamp_ns: None,
-                        is_fixed: fixed.is_some(),
-                    });
+                    links.push(ChainLink { child: at, parent: parent.clone(), fixed: *fixed });
                     at = parent.clone();
                 }
                 None if frames.base.is_none() => break,
@@ -88,12 +80,20 @@ impl TransformTree {
             let base = base.as_deref().unwrap_or_default();
             return Err(bad(format!("{moving:?} does not hang on {base:?}; choose another frame with --base-frame")));
         };
-        if links.iter().all(|link| link.is_fixed) {
+        if links.iter().all(|link| link.fixed.is_some()) {
             return Err(bad(format!(
                 "{moving:?} does not move in {root:?}; choose others with --pose-frame and --base-frame"
             )));
         }
-        Ok(TransformChain { base: root, links, given_ns: None })
+        let mut chain =
+            TransformChain { poses: MovingFrame::new(moving, &root), links, frames: FrameBuffer::default() };
+        for ChainLink { child, parent, fixed } in &chain.links {
+            if let Some(pose) = *fixed {
+                let link = FrameTransform { stamp_ns: 0, parent: parent.clone(), child: child.clone(), pose };
+                chain.poses.push(&mut chain.frames, &[link], true);
+            }
+        }
+        Ok(chain)
     }
 
     /// Each frame with the one that it hangs on.
@@ -110,50 +110,41 @@ impl TransformTree {
 struct ChainLink {
     child: String,
     parent: String,
-    pose: Isometry3<f64>,
-    stamp_ns: Option<i64>,
-    is_fixed: bool,
+    /// of a link that stays
+    fixed: Option<Isometry3<f64>>,
 }
 
-/// The links between two frames, with what was last heard of each.
+/// The links between two frames, and where they were lately.
 pub(super) struct TransformChain {
-    /// in which the poses are
-    pub base: String,
+    pub poses: MovingFrame,
     /// from the moving frame up
     links: Vec<ChainLink>,
-    /// stamp of the last pose
-    given_ns: Option<i64>,
+    frames: FrameBuffer,
 }
 
 impl TransformChain {
-    /// Takes in the links of one message; a pose when all that move have one stamp.
+    /// Takes in the links of one message.
     ///
     /// # Errors
-    /// [`BadMessage::FrameChanged`] for a frame that hangs on another one now; [`BadMessage::TransformsApart`] for a link that moved
-    /// on before the others had reached its stamp, of which there is no pose.
-    pub fn push(&mut self, transforms: Vec<Transform>, are_static: bool) -> Result<Option<StampedPose>, BadMessage> {
-        let (mut has_moved, mut is_apart) = (false, false);
-        for Transform { stamp_ns, parent, child, pose } in transforms {
-            let Some(link) = self.links.iter_mut().find(|link| link.child == child) else { continue };
-            if link.parent != parent {
+    /// [`BadMessage::FrameChanged`] for a frame that hangs on another one now.
+    pub fn push(&mut self, transforms: Vec<FrameTransform>, are_static: bool) -> Result<(), BadMessage> {
+        for transform in transforms {
+            let Some(link) = self.links.iter().find(|link| link.child == transform.child) else { continue };
+            if link.parent != transform.parent {
                 return Err(BadMessage::FrameChanged);
             }
-            link.pose = pose;
-            if !are_static && !link.is_fixed {
-                is_apart |= link.stamp_ns.is_some_and(|before| before != stamp_ns && self.given_ns != Some(before));
-                link.stamp_ns = Some(stamp_ns);
-                has_moved = true;
+            // what stays is repeated by some on the topic of what moves
+            let is_static = are_static || link.fixed.is_some();
+            if self.poses.push(&mut self.frames, &[transform], is_static) > 0 {
+                return Err(BadMessage::Malformed);
             }
         }
-        let mut stamps = self.links.iter().filter(|link| !link.is_fixed).map(|link| link.stamp_ns);
-        let first = stamps.next().flatten();
-        let together = first.filter(|_| has_moved && stamps.all(|stamp| stamp == first));
-        let Some(stamp_ns) = together.filter(|stamp_ns| self.given_ns != Some(*stamp_ns)) else {
-            return if is_apart { Err(BadMessage::TransformsApart) } else { Ok(None) };
-        };
-        self.given_ns = Some(stamp_ns);
-        let pose_ot = self.links.iter().rev().fold(Isometry3::identity(), |pose, link| pose * link.pose);
-        Ok(Some(StampedPose { stamp_ns, pose_ot }))
+        Ok(())
+    }
+
+    /// The next pose; `None` as long as a link may still come to the next stamp.
+    pub fn next_pose(&mut self) -> Option<StampedPose> {
+        self.poses.next_pose(&self.frames)
     }
 }
 
@@ -163,10 +154,16 @@ mod tests {
 
     use super::*;
 
-    fn link(stamp_ns: i64, parent: &str, child: &str, x: f64, turn: f64) -> Transform {
+    fn link(stamp_ns: i64, parent: &str, child: &str, x: f64, turn: f64) -> FrameTransform {
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
         let pose = Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), rotation);
-        Transform { stamp_ns, parent: parent.into(), child: child.into(), pose }
+        FrameTransform { stamp_ns, parent: parent.into(), child: child.into(), pose }
+    }
+
+    /// What a message gives.
+    fn pushed(chain: &mut TransformChain, links: Vec<FrameTransform>) -> Option<StampedPose> {
+        chain.push(links, false).unwrap();
+        chain.next_pose()
     }
 
     fn frames(moving: &str, base: Option<&str>) -> TransformFrames {
@@ -186,9 +183,9 @@ mod tests {
         let mut chain = tree().into_chain(&frames("tool0", Some("base")), Path::new("bag")).unwrap();
         let quarter = std::f64::consts::FRAC_PI_2;
         // along x by 1, a quarter turn: along y by 1, another quarter turn: along -x by 0.1
-        let pose = chain.push(vec![link(5, "base", "arm", 1.0, quarter), link(5, "arm", "hand", 1.0, quarter)], false);
-        let pose = pose.unwrap().unwrap();
-        assert_eq!((pose.stamp_ns, chain.base.as_str()), (5, "base"));
+        let links = vec![link(5, "base", "arm", 1.0, quarter), link(5, "arm", "hand", 1.0, quarter)];
+        let pose = pushed(&mut chain, links).unwrap();
+        assert_eq!((pose.stamp_ns, chain.poses.base()), (5, "base"));
         assert!((pose.pose_ot.translation.vector - Vector3::new(0.9, 1.0, 0.0)).norm() < 1e-12);
         assert!((pose.pose_ot.rotation.angle() - 2.0 * quarter).abs() < 1e-12);
     }
@@ -196,23 +193,22 @@ mod tests {
     #[test]
     fn without_a_base_the_root_of_the_tree_is_it() {
         let mut chain = tree().into_chain(&frames("tool0", None), Path::new("bag")).unwrap();
-        let pose = chain.push(vec![link(5, "base", "arm", 1.0, 0.0), link(5, "arm", "hand", 1.0, 0.0)], false);
-        assert_eq!(chain.base, "world");
-        assert!((pose.unwrap().unwrap().pose_ot.translation.vector.x - 12.1).abs() < 1e-12);
+        let pose = pushed(&mut chain, vec![link(5, "base", "arm", 1.0, 0.0), link(5, "arm", "hand", 1.0, 0.0)]);
+        assert_eq!(chain.poses.base(), "world");
+        assert!((pose.unwrap().pose_ot.translation.vector.x - 12.1).abs() < 1e-12);
     }
 
     #[test]
-    fn links_are_taken_together_only_at_one_stamp() {
+    fn links_that_come_apart_wait_for_one_another_and_keep_their_parents() {
         let mut chain = tree().into_chain(&frames("tool0", Some("base")), Path::new("bag")).unwrap();
-        assert_eq!(chain.push(vec![link(5, "base", "arm", 1.0, 0.0)], false), Ok(None));
-        assert!(chain.push(vec![link(5, "arm", "hand", 1.0, 0.0)], false).unwrap().is_some());
-        assert_eq!(chain.push(vec![link(6, "base", "arm", 1.0, 0.0)], false), Ok(None));
-        assert_eq!(chain.push(vec![link(7, "base", "arm", 1.0, 0.0)], false), Err(BadMessage::TransformsApart));
-        // what concerns other frames gives nothing, and the same again nothing new
-        assert_eq!(chain.push(vec![link(8, "base", "camera", 1.0, 0.0)], false), Ok(None));
-        assert!(chain.push(vec![link(7, "arm", "hand", 1.0, 0.0)], false).unwrap().is_some());
-        assert_eq!(chain.push(vec![link(7, "arm", "hand", 1.0, 0.0)], false), Ok(None));
+        assert_eq!(pushed(&mut chain, vec![link(5, "base", "arm", 1.0, 0.0)]), None);
+        assert!(pushed(&mut chain, vec![link(5, "arm", "hand", 1.0, 0.0)]).is_some());
+        // what concerns other frames gives nothing, and what stays may be repeated among what moves
+        assert_eq!(pushed(&mut chain, vec![link(8, "base", "camera", 1.0, 0.0)]), None);
+        assert_eq!(pushed(&mut chain, vec![link(9, "hand", "tool0", 0.1, 0.0)]), None);
         assert_eq!(chain.push(vec![link(9, "camera", "hand", 1.0, 0.0)], false), Err(BadMessage::FrameChanged));
+        assert!(pushed(&mut chain, vec![link(9, "base", "arm", 1.0, 0.0), link(9, "arm", "hand", 1.0, 0.0)]).is_some());
+        assert_eq!((chain.poses.take_apart(), chain.poses.interpolated), (0, 0));
     }
 
     #[test]

@@ -1,9 +1,14 @@
-//! The numbers and names of a ROS message, one after another, in either of the two ways in which ROS lays them out.
+//! The numbers, names and poses of a ROS message, one after another, in either of the two ways in which ROS lays them out.
 //!
 //! ROS 2: CDR, XCDR version 1, in either byte order, each number at a multiple of its size, strings with a final zero. ROS 1: little
 //! endian, nothing between the fields. No length is believed before it is compared with the bytes that are there.
 
+use nalgebra::{Isometry3, Quaternion};
+use serde::Deserialize;
+use serde::de::SeqAccess;
+
 use super::error::BadMessage;
+use touchup_core::stylus::{Wrench, measured_rotation};
 
 /// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred transforms for a tree of frames.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;
@@ -34,10 +39,74 @@ impl Wire {
 }
 
 /// Stamp and frame of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Header<'a> {
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Header {
     pub stamp_ns: i64,
-    pub frame: &'a str,
+    pub frame: String,
+}
+
+/// The fields of a message, one after another.
+pub(super) trait MessageFields {
+    fn u32(&mut self) -> Result<u32, BadMessage>;
+
+    fn f64(&mut self) -> Result<f64, BadMessage>;
+
+    /// The name of a frame, or of a joint.
+    fn name(&mut self) -> Result<String, BadMessage>;
+
+    /// Bytes behind what was read, at most as many as a message has. Nothing is read any more.
+    fn rest(&mut self) -> usize;
+
+    /// A `std_msgs/Header`.
+    fn header(&mut self) -> Result<Header, BadMessage> {
+        let [sec, nanosec] = [self.u32()?, self.u32()?];
+        // the bits of an int32
+        header_of(i64::from(sec.cast_signed()), nanosec, &self.name()?)
+    }
+
+    /// Count of a sequence each of whose entries takes at least `least_bytes`.
+    fn count(&mut self, _least_bytes: usize) -> Result<usize, BadMessage> {
+        usize::try_from(self.u32()?).map_err(|_| BadMessage::Malformed)
+    }
+
+    /// The message ends here.
+    fn end(&mut self) -> Result<(), BadMessage> {
+        if self.rest() <= MAX_PADDING_BYTES { Ok(()) } else { Err(BadMessage::Malformed) }
+    }
+
+    fn f64s<const N: usize>(&mut self) -> Result<[f64; N], BadMessage> {
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = self.f64()?;
+        }
+        Ok(numbers)
+    }
+
+    /// Position and quaternion (x, y, z, w), which a pose and a transform have in the same order.
+    fn pose(&mut self) -> Result<Isometry3<f64>, BadMessage> {
+        let position = self.f64s::<3>()?;
+        let rotation = measured_rotation(Quaternion::from(self.f64s::<4>()?)).ok_or(BadMessage::Quaternion)?;
+        Ok(Isometry3::from_parts(position.into(), rotation))
+    }
+
+    fn wrench(&mut self) -> Result<Wrench, BadMessage> {
+        Ok(Wrench { force: self.f64s::<3>()?.into(), torque: self.f64s::<3>()?.into() })
+    }
+
+    /// Passes over numbers.
+    fn skip_f64s(&mut self, count: usize) -> Result<(), BadMessage> {
+        (0..count).try_for_each(|_| self.f64().map(drop))
+    }
+}
+
+fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> {
+    let nanosec = i64::from(nanosec);
+    if nanosec >= NS_PER_S {
+        return Err(BadMessage::Stamp);
+    }
+    // a slash in front says nothing
+    let frame = frame.strip_prefix('/').unwrap_or(frame).to_owned();
+    Ok(Header { stamp_ns: sec * NS_PER_S + nanosec, frame })
 }
 
 /// What is left of a payload.
@@ -79,36 +148,27 @@ impl<'a> WireReader<'a> {
         Ok(number)
     }
 
-    pub fn u32(&mut self) -> Result<u32, BadMessage> {
+    fn left(&self) -> usize {
+        self.body.len().saturating_sub(self.at)
+    }
+}
+
+impl MessageFields for WireReader<'_> {
+    fn u32(&mut self) -> Result<u32, BadMessage> {
         self.number().map(u32::from_le_bytes)
     }
 
-    pub fn f64(&mut self) -> Result<f64, BadMessage> {
+    fn f64(&mut self) -> Result<f64, BadMessage> {
         self.number().map(f64::from_le_bytes)
     }
 
-    pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], BadMessage> {
-        let mut numbers = [0.0; N];
-        for number in &mut numbers {
-            *number = self.f64()?;
-        }
-        Ok(numbers)
-    }
-
-    /// Passes over numbers.
-    pub fn skip_f64s(&mut self, count: usize) -> Result<(), BadMessage> {
-        (0..count).try_for_each(|_| self.f64().map(drop))
-    }
-
-    /// Count of a sequence each of whose entries takes at least `least_bytes`.
-    pub fn count(&mut self, least_bytes: usize) -> Result<usize, BadMessage> {
+    fn count(&mut self, least_bytes: usize) -> Result<usize, BadMessage> {
         let count = usize::try_from(self.u32()?).map_err(|_| BadMessage::Malformed)?;
         let is_there = count.checked_mul(least_bytes).is_some_and(|bytes| bytes <= self.left());
         if is_there { Ok(count) } else { Err(BadMessage::Malformed) }
     }
 
-    /// The name of a frame.
-    pub fn name(&mut self) -> Result<&'a str, BadMessage> {
+    fn name(&mut self) -> Result<String, BadMessage> {
         let length = self.count(1)?;
         let bytes = self.bytes(length)?;
         let text = match (self.wire, bytes) {
@@ -118,35 +178,57 @@ impl<'a> WireReader<'a> {
             (Wire::Cdr, _) => return Err(BadMessage::Malformed),
         };
         let text = str::from_utf8(text).map_err(|_| BadMessage::Malformed)?;
-        if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text) } else { Err(BadMessage::Malformed) }
+        if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text.to_owned()) } else { Err(BadMessage::Malformed) }
     }
 
-    /// A `std_msgs/Header`. Of ROS 1 its frame may begin with a slash, which says nothing.
-    pub fn header(&mut self) -> Result<Header<'a>, BadMessage> {
+    fn header(&mut self) -> Result<Header, BadMessage> {
         if self.wire == Wire::Ros1 {
             self.u32()?;
         }
-        let [sec, nanosec] = [self.number()?, self.number()?];
-        let nanosec = i64::from(u32::from_le_bytes(nanosec));
-        let sec = match self.wire {
-            Wire::Cdr => i64::from(i32::from_le_bytes(sec)),
-            Wire::Ros1 => i64::from(u32::from_le_bytes(sec)),
-        };
-        let frame = self.name()?;
-        if nanosec >= NS_PER_S {
-            return Err(BadMessage::Stamp);
-        }
-        Ok(Header { stamp_ns: sec * NS_PER_S + nanosec, frame: frame.strip_prefix('/').unwrap_or(frame) })
+        let [sec, nanosec] = [self.u32()?, self.u32()?];
+        let sec = if self.wire == Wire::Ros1 { i64::from(sec) } else { i64::from(sec.cast_signed()) };
+        header_of(sec, nanosec, &self.name()?)
     }
 
-    /// Bytes that were not read.
-    pub fn left(&self) -> usize {
-        self.body.len().saturating_sub(self.at)
+    fn rest(&mut self) -> usize {
+        let left = self.left();
+        self.at = self.body.len();
+        left
     }
 
-    /// The message ends here.
-    pub fn end(&self) -> Result<(), BadMessage> {
+    fn end(&mut self) -> Result<(), BadMessage> {
         let padding = if self.wire == Wire::Cdr { MAX_PADDING_BYTES } else { 0 };
         if self.left() <= padding { Ok(()) } else { Err(BadMessage::Malformed) }
+    }
+}
+
+/// The fields as a deserializer hands them out, for messages that a library receives and unpacks.
+pub(super) struct SequenceFields<A>(pub A);
+
+impl<'de, A: SeqAccess<'de>> SequenceFields<A> {
+    fn next<T: Deserialize<'de>>(&mut self) -> Result<T, BadMessage> {
+        self.0.next_element().ok().flatten().ok_or(BadMessage::Malformed)
+    }
+}
+
+impl<'de, A: SeqAccess<'de>> MessageFields for SequenceFields<A> {
+    fn u32(&mut self) -> Result<u32, BadMessage> {
+        self.next()
+    }
+
+    fn f64(&mut self) -> Result<f64, BadMessage> {
+        self.next()
+    }
+
+    fn name(&mut self) -> Result<String, BadMessage> {
+        self.next().and_then(
+            |text: String| {
+                if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text) } else { Err(BadMessage::Malformed) }
+            },
+        )
+    }
+
+    fn rest(&mut self) -> usize {
+        (0..MAX_MESSAGE_BYTES).take_while(|_| self.next::<u8>().is_ok()).count()
     }
 }

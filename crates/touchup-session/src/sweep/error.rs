@@ -94,8 +94,14 @@ pub enum SweepError {
     Simulated(#[from] SimError),
     /// A result that cannot be written.
     #[error(transparent)]
-    Outcome(#[from] OutcomeError),
+    Outcome(Box<OutcomeError>),
     /// The features of a result.
     #[error(transparent)]
     Features(#[from] FeaturesFileError),
+}
+
+impl From<OutcomeError> for SweepError {
+    fn from(error: OutcomeError) -> Self {
+        Self::Outcome(error.into())
+    }
 }

@@ -178,7 +178,8 @@ fn beside(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
 fn relative(path: &Path, folder: &Path) -> PathBuf {
     let (mut path, mut folder) = (path.components().peekable(), folder.components().peekable());
     while path.peek().is_some() && path.peek() == folder.peek() {
-        (path.next(), folder.next());
+        path.next();
+        folder.next();
     }
     folder.map(|_| Component::ParentDir).chain(path).collect()
 }

@@ -184,10 +184,10 @@ enum JobFailure {
 impl From<RefinementError> for JobFailure {
     fn from(error: RefinementError) -> Self {
         match error {
-            RefinementError::Outcome(error @ (OutcomeError::Unchanged | OutcomeError::Mesh(_))) => {
-                Self::OfInput(error.to_string())
-            }
-            RefinementError::Outcome(error) => Self::OfSystem(error.into()),
+            RefinementError::Outcome(error) => match *error {
+                OutcomeError::Unchanged | OutcomeError::Mesh(_) => Self::OfInput(error.to_string()),
+                error => Self::OfSystem(error.into()),
+            },
             error => Self::OfInput(error.to_string()),
         }
     }

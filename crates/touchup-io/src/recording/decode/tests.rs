@@ -1,7 +1,12 @@
-use nalgebra::{Translation3, Vector3};
+use cdr_encoding::CdrDeserializer;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use serde::de::DeserializeSeed;
+use touchup_core::stylus::Wrench;
 
 use super::super::cdr::{encode_pose, encode_wrench};
 use super::super::layout::TopicKind;
+use super::super::wire::Wire;
+use super::super::{LiveType, SampleKind};
 use super::*;
 
 const POSE: MessageFormat = MessageFormat { message_type: MessageType::PoseStamped, wire: Wire::Cdr };
@@ -148,8 +153,10 @@ fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
     let head = [&9u32.to_le_bytes()[..], &7u32.to_le_bytes(), &5u32.to_le_bytes(), &1u32.to_le_bytes(), b"b"].concat();
     let whole = [&head[..], &ros1, &[0; 75]].concat();
     let format = MessageFormat { message_type: MessageType::FrankaState, wire: Wire::Ros1 };
-    let Ok(Decoded::State(frame, pose, wrench)) = decode(format, &whole, 0) else { panic!("a state is one") };
-    assert_eq!((frame.as_str(), pose.stamp_ns, wrench.stamp_ns), ("b", 7_000_000_005, 7_000_000_005));
+    let Ok(Decoded::State(state)) = decode(format, &whole, 0) else { panic!("a state is one") };
+    let ArmState { pose_frame, pose, wrench_frame, wrench } = *state;
+    assert_eq!((pose_frame.as_str(), wrench_frame.as_str()), ("b", "b"));
+    assert_eq!((pose.stamp_ns, wrench.stamp_ns), (7_000_000_005, 7_000_000_005));
     assert_eq!(pose.pose_ot.translation.vector, Vector3::new(0.3, 0.4, 0.5));
     assert!((pose.pose_ot.rotation * Vector3::x() - Vector3::y()).norm() < 1e-15);
     let Wrench { force, torque } = wrench.wrench;
@@ -171,4 +178,61 @@ fn what_gives_no_pose_is_refused_with_what_does_and_the_flag() {
     assert!(why.contains("Imu") && why.contains("WrenchStamped") && why.contains("--wrench-topic"), "{why}");
     let why = of("tf2_msgs/msg/TFMessage", TopicKind::Pose).unwrap_err();
     assert!(why.contains("--pose-frame"), "{why}");
+}
+
+/// What a library unpacks in either byte order gives what the bytes themselves give, bit by bit, and ends where they end.
+#[test]
+fn fields_that_a_deserializer_hands_out_are_those_of_the_bytes() {
+    for order in [0, 1] {
+        let numbers = [1.0, f64::NAN, 3.5, 0.5, -0.5, 0.5, 0.5];
+        let bytes = pose_bytes(order, numbers, 9);
+        let message = LiveType::of(SampleKind::Pose, "").unwrap();
+        let unpacked = |body: &[u8]| match order {
+            0 => message.seed(5).deserialize(&mut CdrDeserializer::<byteorder::BigEndian>::new(body)).unwrap(),
+            _ => message.seed(5).deserialize(&mut CdrDeserializer::<byteorder::LittleEndian>::new(body)).unwrap(),
+        };
+        for len in 4..=bytes.len() {
+            let (live, read) = (unpacked(&bytes[4..len]), message.decode(&bytes[..len], 5));
+            assert_eq!(format!("{live:?}"), format!("{read:?}"), "{len} bytes");
+            assert_eq!(live.is_ok(), len == bytes.len());
+        }
+        for more in 1..9 {
+            let longer = [bytes.clone(), vec![0; more]].concat();
+            assert_eq!(unpacked(&longer[4..]).is_ok(), more <= 3, "{more} more");
+        }
+    }
+}
+
+/// Of every type, whatever the bytes are: drawn at random, and zeros, which are whole messages of some length.
+#[test]
+fn no_bytes_are_read_otherwise_by_a_deserializer() {
+    let mut state = 1_u64;
+    let mut drawn = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 56) as u8
+    };
+    for (kind, names) in [
+        (SampleKind::Pose, &["PoseStamped", "Pose", "PoseWithCovarianceStamped", "TransformStamped"][..]),
+        (SampleKind::Wrench, &["WrenchStamped", "Wrench"]),
+    ] {
+        let others = ["nav_msgs/msg/Odometry", "iiwa_msgs/msg/CartesianPose", "iiwa_msgs/msg/CartesianWrench"];
+        let states = ["franka_msgs/msg/FrankaState", "franka_msgs/msg/FrankaRobotState"];
+        let names = names.iter().map(|name| format!("geometry_msgs/msg/{name}"));
+        for name in names.chain([&others[..], &states].concat().into_iter().map(str::to_owned)) {
+            let Ok(message) = LiveType::of(kind, &name) else { continue };
+            let mut whole = 0;
+            for len in (4..2600).step_by(3) {
+                let noise: Vec<u8> = (0..len).map(|_| drawn()).collect();
+                for mut bytes in [noise, vec![0; len]] {
+                    bytes[..4].copy_from_slice(&[0, 1, 0, 0]);
+                    let mut unpacked = CdrDeserializer::<byteorder::LittleEndian>::new(&bytes[4..]);
+                    let live = message.seed(7).deserialize(&mut unpacked).unwrap();
+                    assert_eq!(format!("{live:?}"), format!("{:?}", message.decode(&bytes, 7)), "{name}, {len} bytes");
+                    // a quaternion of zeros is none, and comes in the midst of a message
+                    whole += u64::from(live.is_ok() || live == Err(BadMessage::Quaternion));
+                }
+            }
+            assert!(whole > 0, "{name}");
+        }
+    }
 }

@@ -2,19 +2,31 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use nalgebra::{Isometry3, UnitQuaternion};
+use nalgebra::Isometry3;
 
-use super::convert::{stamp_ns, transform};
-use crate::ros::messages::TransformStamped;
+use super::sync::interpolated;
 
 /// So much of what moves is kept, ns.
-const KEPT_NS: i64 = 10_000_000_000;
+pub(super) const KEPT_NS: i64 = 10_000_000_000;
 /// A moving frame has so many poses at most: 10 s at 1 kHz.
 const MOST_POSES: usize = 10_000;
 /// Frames are so many at most: a cell has dozens.
 const MOST_FRAMES: usize = 1000;
 /// A longer name is none.
 const LONGEST_NAME: usize = 256;
+
+/// Where a frame is in its parent at one instant, as `geometry_msgs/TransformStamped` has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameTransform {
+    /// ns; says nothing where the frame stays
+    pub stamp_ns: i64,
+    /// name of the parent
+    pub parent: String,
+    /// name of the frame
+    pub child: String,
+    /// pose of the frame in its parent
+    pub pose: Isometry3<f64>,
+}
 
 /// Why two frames are not connected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -34,6 +46,9 @@ pub enum FrameError {
     /// The moment is after what has come so far; it may still come.
     #[error("frame \"{0}\" is known up to {1} ns, {2} ns was asked for")]
     NotYet(String, i64, i64),
+    /// The moment is between two poses that are farther apart in time than is bridged.
+    #[error("frame \"{0}\" has no transform for {1} ns around {2} ns")]
+    Gap(String, i64, i64),
 }
 
 /// Where a frame is in its parent.
@@ -63,14 +78,13 @@ pub fn plain_name(name: &str) -> &str {
 
 impl FrameBuffer {
     /// Takes a transform; whether it was one that can be.
-    pub fn insert(&mut self, stamped: &TransformStamped, is_static: bool) -> bool {
-        let (parent, child) = (plain_name(&stamped.header.frame_id), plain_name(&stamped.child_frame_id));
+    pub fn insert(&mut self, transform: &FrameTransform, is_static: bool) -> bool {
+        let FrameTransform { stamp_ns, pose, .. } = *transform;
+        let (parent, child) = (plain_name(&transform.parent), plain_name(&transform.child));
         let is_name = |name: &str| !name.is_empty() && name.len() <= LONGEST_NAME;
         let is_room = self.links.len() < MOST_FRAMES || self.links.contains_key(child);
-        let (Some(pose), Some(stamp)) = (transform(&stamped.transform), stamp_ns(&stamped.header.stamp)) else {
-            return false;
-        };
-        if !is_name(parent) || !is_name(child) || parent == child || !is_room {
+        let is_finite = pose.translation.vector.iter().all(|x| x.is_finite());
+        if !is_finite || !is_name(parent) || !is_name(child) || parent == child || !is_room {
             return false;
         }
         let fresh = || FrameLink { parent: parent.to_owned(), motion: FrameMotion::Moving(VecDeque::new()) };
@@ -80,8 +94,8 @@ impl FrameBuffer {
         }
         match &mut link.motion {
             motion if is_static => *motion = FrameMotion::Static(pose),
-            FrameMotion::Static(_) => link.motion = FrameMotion::Moving(VecDeque::from([(stamp, pose)])),
-            FrameMotion::Moving(poses) => keep(poses, stamp, pose),
+            FrameMotion::Static(_) => link.motion = FrameMotion::Moving(VecDeque::from([(stamp_ns, pose)])),
+            FrameMotion::Moving(poses) => keep(poses, stamp_ns, pose),
         }
         true
     }
@@ -96,7 +110,26 @@ impl FrameBuffer {
     /// # Errors
     /// [`FrameError`]
     pub fn pose(&self, in_frame: &str, of: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
-        let (target, source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
+        Ok(self.bridged_pose(in_frame, of, stamp_ns, i64::MAX)?.0)
+    }
+
+    /// The same where no link lacks transforms for longer than `longest_gap_ns`; and whether a link is between two of them.
+    pub(super) fn bridged_pose(
+        &self,
+        in_frame: &str,
+        of: &str,
+        stamp_ns: i64,
+        longest_gap_ns: i64,
+    ) -> Result<(Isometry3<f64>, bool), FrameError> {
+        let [down, up] = self.links_between(in_frame, of)?;
+        let (down, is_between) = self.climbed(&down, stamp_ns, longest_gap_ns)?;
+        let (up, is_also) = self.climbed(&up, stamp_ns, longest_gap_ns)?;
+        Ok((down.inv_mul(&up), is_between || is_also))
+    }
+
+    /// The frames from `in_frame`, and those from `of`, to below the first that both hang on.
+    pub(super) fn links_between<'a>(&'a self, in_frame: &'a str, of: &'a str) -> Result<[Vec<&'a str>; 2], FrameError> {
+        let (mut target, mut source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
         let Some(up) = source.iter().position(|name| target.contains(name)) else {
             // of two that are not known the one that a header names
             let unknown = [of, in_frame].into_iter().find(|name| !self.is_known(name));
@@ -105,8 +138,14 @@ impl FrameBuffer {
                 None => FrameError::NotConnected(in_frame.to_owned(), of.to_owned()),
             });
         };
-        let down = target.iter().position(|name| *name == source[up]).unwrap_or(0);
-        Ok(self.climbed(&target[..down], stamp_ns)?.inv_mul(&self.climbed(&source[..up], stamp_ns)?))
+        target.truncate(target.iter().position(|name| *name == source[up]).unwrap_or(0));
+        source.truncate(up);
+        Ok([target, source])
+    }
+
+    /// Whether a frame moves in its parent.
+    pub(super) fn moves(&self, name: &str) -> bool {
+        self.links.get(name).is_some_and(|link| matches!(link.motion, FrameMotion::Moving(_)))
     }
 
     /// A frame of which a transform has come, as a child or as a parent.
@@ -115,7 +154,7 @@ impl FrameBuffer {
     }
 
     /// The frame itself and all above it.
-    fn ancestors<'a>(&'a self, name: &'a str) -> Result<Vec<&'a str>, FrameError> {
+    pub(super) fn ancestors<'a>(&'a self, name: &'a str) -> Result<Vec<&'a str>, FrameError> {
         let mut names = vec![name];
         let mut at = name;
         while let Some(link) = self.links.get(at) {
@@ -129,9 +168,16 @@ impl FrameBuffer {
     }
 
     /// The pose of the first of these frames in the parent of the last.
-    fn climbed(&self, names: &[&str], stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
-        names.iter().try_fold(Isometry3::identity(), |below, name| {
-            Ok(self.links.get(*name).map_or(Ok(Isometry3::identity()), |link| link.motion.at(name, stamp_ns))? * below)
+    fn climbed(
+        &self,
+        names: &[&str],
+        stamp_ns: i64,
+        longest_gap_ns: i64,
+    ) -> Result<(Isometry3<f64>, bool), FrameError> {
+        names.iter().try_fold((Isometry3::identity(), false), |(below, is_between), name| {
+            let Some(link) = self.links.get(*name) else { return Ok((below, is_between)) };
+            let (pose, is_also) = link.motion.at(name, stamp_ns, longest_gap_ns)?;
+            Ok((pose * below, is_between || is_also))
         })
     }
 }
@@ -149,21 +195,23 @@ fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3
 }
 
 impl FrameMotion {
-    /// Straight between two poses, at constant angular velocity the shorter way.
-    fn at(&self, name: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
+    /// Straight between two poses, at constant angular velocity the shorter way; and whether it is between two.
+    fn at(&self, name: &str, stamp_ns: i64, longest_gap_ns: i64) -> Result<(Isometry3<f64>, bool), FrameError> {
         let poses = match self {
-            Self::Static(pose) => return Ok(*pose),
+            Self::Static(pose) => return Ok((*pose, false)),
             Self::Moving(poses) => poses,
         };
         let next = poses.partition_point(|(stamp, _)| *stamp < stamp_ns);
         let (first, last) = (poses.front().map_or(i64::MAX, |p| p.0), poses.back().map_or(i64::MIN, |p| p.0));
         match (poses.get(next), next.checked_sub(1).and_then(|before| poses.get(before))) {
-            (Some((stamp, pose)), _) if *stamp == stamp_ns => Ok(*pose),
+            (Some((stamp, pose)), _) if *stamp == stamp_ns => Ok((*pose, false)),
             (Some((end, after)), Some((start, before))) => {
-                let t = (stamp_ns - start) as f64 / (end - start) as f64;
-                let position = before.translation.vector.lerp(&after.translation.vector, t);
-                let turn: UnitQuaternion<f64> = before.rotation.inverse() * after.rotation;
-                Ok(Isometry3::from_parts(position.into(), before.rotation * turn.powf(t)))
+                let gap_ns = end.saturating_sub(*start);
+                if gap_ns > longest_gap_ns {
+                    return Err(FrameError::Gap(name.to_owned(), gap_ns, stamp_ns));
+                }
+                let t = (stamp_ns - start) as f64 / gap_ns as f64;
+                Ok((interpolated(before, after, t), true))
             }
             (Some(_), None) => Err(FrameError::TooEarly(name.to_owned(), first, stamp_ns)),
             (None, _) => Err(FrameError::NotYet(name.to_owned(), last, stamp_ns)),
@@ -173,21 +221,14 @@ impl FrameMotion {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
     use super::*;
-    use crate::ros::messages::{Header, Quaternion, Time, Transform, Vector3 as Vector3Msg};
 
-    fn stamped(parent: &str, child: &str, sec: i32, x: f64, quarter_turns: f64) -> TransformStamped {
-        let half = quarter_turns * std::f64::consts::FRAC_PI_4;
-        TransformStamped {
-            header: Header { stamp: Time { sec, nanosec: 0 }, frame_id: parent.to_owned() },
-            child_frame_id: child.to_owned(),
-            transform: Transform {
-                translation: Vector3Msg { x, y: 0.0, z: 0.0 },
-                rotation: Quaternion { x: 0.0, y: 0.0, z: half.sin(), w: half.cos() },
-            },
-        }
+    fn stamped(parent: &str, child: &str, sec: i64, x: f64, quarter_turns: f64) -> FrameTransform {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), quarter_turns * std::f64::consts::FRAC_PI_2);
+        let pose = Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), turn);
+        FrameTransform { stamp_ns: sec * 1_000_000_000, parent: parent.to_owned(), child: child.to_owned(), pose }
     }
 
     /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool is 1 m along its x.
@@ -221,7 +262,7 @@ mod tests {
         assert_eq!(frames.pose("b", "d", 0), Err(FrameError::NotConnected("b".into(), "d".into())));
         frames.insert(&stamped("b", "a", 0, 0.0, 0.0), true);
         assert!(matches!(frames.pose("c", "a", 0), Err(FrameError::Cycle(_))));
-        for bad in [stamped("a", "a", 0, 0.0, 0.0), stamped("", "a", 0, 0.0, 0.0), stamped("a", "b", -1, 0.0, 0.0)] {
+        for bad in [stamped("a", "a", 0, 0.0, 0.0), stamped("", "a", 0, 0.0, 0.0)] {
             assert!(!frames.insert(&bad, false));
         }
         assert!(!frames.insert(&stamped("a", "b", 0, f64::NAN, 0.0), false));
@@ -231,7 +272,7 @@ mod tests {
     fn memory_is_bounded() {
         let mut frames = FrameBuffer::default();
         for sec in 0..100 {
-            frames.insert(&stamped("a", "b", sec, f64::from(sec), 0.0), false);
+            frames.insert(&stamped("a", "b", sec, sec as f64, 0.0), false);
         }
         assert!(matches!(frames.pose("a", "b", 88_000_000_000), Err(FrameError::TooEarly(_, 89_000_000_000, _))));
         for number in 0..5000 {

@@ -1,0 +1,139 @@
+//! Where poses and wrenches come from: which type of messages is listened to, and what is made of them.
+
+use std::time::Instant;
+
+use super::arguments::NodeConfig;
+use super::node::{as_pose, as_wrench};
+use super::parameters::CELL_FRAME;
+use super::port::Arrival;
+use crate::io::recording::{LiveMessage, LiveType, SampleKind};
+use crate::stylus::Message;
+
+/// A topic of poses or of wrenches.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct SampleSource {
+    kind: SampleKind,
+    /// by its parameter; `None`: that of who publishes
+    named: Option<LiveType>,
+    usual: LiveType,
+    /// of messages that name none
+    frame: String,
+}
+
+impl SampleSource {
+    /// That of poses, or of wrenches, as the parameters have it; `None` for poses that are taken from transforms.
+    ///
+    /// # Errors
+    /// In words, where the type named by a parameter gives nothing: the parameters are checked before.
+    pub fn of(config: &NodeConfig, kind: SampleKind) -> Result<Option<Self>, String> {
+        let parameters = &config.parameters;
+        let name = |of: &str| parameters.string(of).to_owned();
+        let type_name = match kind {
+            SampleKind::Pose if parameters.pose_frames().is_some() => return Ok(None),
+            SampleKind::Pose => name("pose_type"),
+            SampleKind::Wrench => name("wrench_type"),
+        };
+        // as in a recording: of two without headers both are in the same axes, else the wrench is in those of its sensor
+        let is_pose_unnamed =
+            || LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header());
+        let frame = match kind {
+            SampleKind::Wrench if !is_pose_unnamed() => format!("{}_sensor", name("source")),
+            _ => CELL_FRAME.to_owned(),
+        };
+        let (usual, known) = (LiveType::of(kind, "")?, LiveType::of(kind, &type_name)?);
+        Ok(Some(Self { kind, named: (!type_name.is_empty()).then_some(known), usual, frame }))
+    }
+
+    /// The type to listen to before anybody publishes.
+    pub fn first_type(&self) -> LiveType {
+        self.named.unwrap_or(self.usual)
+    }
+
+    /// The type to listen to, and why what is published cannot be read, where none of it can.
+    ///
+    /// - `now`: that which is listened to; it stays as long as somebody publishes it, or nobody what can be read.
+    /// - `published`: names of types, as ROS 2 has them.
+    pub fn choose<'a>(
+        &self,
+        now: LiveType,
+        published: impl IntoIterator<Item = &'a str>,
+    ) -> (LiveType, Option<String>) {
+        let published: Vec<&str> = published.into_iter().collect();
+        if published.is_empty() || published.contains(&now.name()) {
+            return (now, None);
+        }
+        if let Some(named) = self.named {
+            let parameter = if self.kind == SampleKind::Pose { "pose_type" } else { "wrench_type" };
+            let why = format!("somebody publishes {}, the parameter {parameter} names {}", published[0], named.name());
+            return (now, Some(why));
+        }
+        let known: Vec<_> = published.iter().map(|name| LiveType::of(self.kind, name)).collect();
+        match known.iter().find_map(|of| of.as_ref().ok()) {
+            Some(readable) => (*readable, None),
+            None => (now, known.into_iter().find_map(Result::err).map(|why| format!("somebody publishes {why}"))),
+        }
+    }
+
+    /// What goes to the node.
+    pub fn arrival(&self, read: LiveMessage) -> Arrival {
+        let frame = if read.frame.is_empty() { &self.frame } else { &read.frame };
+        match &read.message {
+            Message::Pose(pose) => Arrival::Pose(as_pose(pose, frame), Instant::now()),
+            Message::Wrench(wrench) => Arrival::Wrench(as_wrench(wrench, frame), Instant::now()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stylus::{StampedWrench, Wrench};
+
+    fn source(kind: SampleKind, arguments: &[&str]) -> Option<SampleSource> {
+        let arguments: Vec<_> = arguments.iter().flat_map(|one| ["-p".to_owned(), (*one).to_owned()]).collect();
+        SampleSource::of(&NodeConfig::new(&arguments, |_| None).unwrap(), kind).unwrap()
+    }
+
+    #[test]
+    fn the_type_is_that_of_who_publishes_what_can_be_read() {
+        let poses = source(SampleKind::Pose, &[]).unwrap();
+        let first = poses.first_type();
+        assert_eq!(first.name(), "geometry_msgs/msg/PoseStamped");
+        assert_eq!(poses.choose(first, []), (first, None));
+        let (odometry, why) = poses.choose(first, ["sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"]);
+        assert_eq!((odometry.name(), why), ("nav_msgs/msg/Odometry", None));
+        // who publishes another type beside changes nothing, and who leaves neither
+        assert_eq!(poses.choose(odometry, [first.name(), odometry.name()]), (odometry, None));
+        assert_eq!(poses.choose(odometry, []), (odometry, None));
+        let (stays, why) = poses.choose(first, ["sensor_msgs/msg/Imu"]);
+        let why = why.unwrap();
+        assert!(stays == first && why.contains("sensor_msgs/msg/Imu, not geometry_msgs/msg/PoseStamped"), "{why}");
+        let (_, why) = poses.choose(first, ["tf2_msgs/msg/TFMessage"]);
+        assert!(why.unwrap().contains("pose_frame"));
+    }
+
+    #[test]
+    fn a_type_that_is_named_stays() {
+        let wrenches = source(SampleKind::Wrench, &["wrench_type:=geometry_msgs/msg/Wrench"]).unwrap();
+        let first = wrenches.first_type();
+        let (stays, why) = wrenches.choose(first, ["geometry_msgs/msg/WrenchStamped"]);
+        assert!(stays == first && why.unwrap().contains("the parameter wrench_type names geometry_msgs/msg/Wrench"));
+        assert_eq!(source(SampleKind::Pose, &["pose_frame:=tool0"]), None);
+    }
+
+    #[test]
+    fn what_names_no_frame_is_in_that_of_the_parameters() {
+        let frame = |arguments: &[&str], own: &str| {
+            let wrench = StampedWrench { stamp_ns: 5, wrench: Wrench::default() };
+            let read = LiveMessage { frame: own.to_owned(), message: Message::Wrench(wrench) };
+            match source(SampleKind::Wrench, arguments).unwrap().arrival(read) {
+                Arrival::Wrench(wrench, _) => wrench.header.frame_id,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(frame(&[], "ft"), "ft");
+        assert_eq!(frame(&["source:=probe"], ""), "probe_sensor");
+        let unnamed = "pose_type:=geometry_msgs/msg/Pose";
+        assert_eq!(frame(&[unnamed], ""), "cell");
+    }
+}

@@ -1,0 +1,296 @@
+"""Poses and wrenches of any type that recordings may have, live: to the byte what the same numbers give as PoseStamped and WrenchStamped.
+
+CycloneDDS publishes; the node is not told the types, but finds them.
+"""
+
+import subprocess
+import time
+from dataclasses import astuple
+
+import numpy as np
+import pytest
+from cyclonedds.idl.types import array, float64, sequence
+from ros_cyclone import (
+    BEST_EFFORT,
+    RELIABLE,
+    DiagnosticArray,
+    Header,
+    Peer,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Time,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+    message,
+)
+from ros_domains import domains
+from ros_player import STAMPED, pose, recorded, sent_in_step, wrench
+from ros_process import Node
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
+from test_recordings import POSE, WRENCH, numbers
+from test_ros_node import CYCLONE, scene_for
+
+
+@message("geometry_msgs/msg/PoseWithCovariance")
+class PoseWithCovariance:
+    pose: Pose
+    covariance: array[float64, 36]
+
+
+@message("geometry_msgs/msg/PoseWithCovarianceStamped")
+class PoseWithCovarianceStamped:
+    header: Header
+    pose: PoseWithCovariance
+
+
+@message("geometry_msgs/msg/Twist")
+class Twist:
+    linear: Vector3
+    angular: Vector3
+
+
+@message("geometry_msgs/msg/TwistWithCovariance")
+class TwistWithCovariance:
+    twist: Twist
+    covariance: array[float64, 36]
+
+
+@message("nav_msgs/msg/Odometry")
+class Odometry:
+    header: Header
+    child_frame_id: str
+    pose: PoseWithCovariance
+    twist: TwistWithCovariance
+
+
+@message("geometry_msgs/msg/Transform")
+class Transform:
+    translation: Vector3
+    rotation: Quaternion
+
+
+@message("geometry_msgs/msg/TransformStamped")
+class TransformStamped:
+    header: Header
+    child_frame_id: str
+    transform: Transform
+
+
+@message("tf2_msgs/msg/TFMessage")
+class TFMessage:
+    transforms: sequence[TransformStamped]
+
+
+@message("sensor_msgs/msg/Temperature")
+class Temperature:
+    header: Header
+    temperature: float64
+    variance: float64
+
+
+COVARIANCE = [float(number) for number in range(36)]
+
+
+@pytest.fixture
+def domain():
+    return next(domains)
+
+
+def transform(header, child, read):
+    p, q = read.pose.position, read.pose.orientation
+    return TransformStamped(header, child, Transform(Vector3(p.x, p.y, p.z), Quaternion(q.x, q.y, q.z, q.w)))
+
+
+def with_covariance(read):
+    return PoseWithCovariance(pose(read), COVARIANCE)
+
+
+def odometry(header, read):
+    twist = TwistWithCovariance(Twist(Vector3(7.0, 8.0, 9.0), Vector3(1.0, 2.0, 3.0)), COVARIANCE)
+    return Odometry(header, "tool0", with_covariance(read), twist)
+
+
+KINDS = {
+    "Odometry": (Odometry, odometry),
+    "PoseWithCovarianceStamped": (PoseWithCovarianceStamped, lambda h, read: PoseWithCovarianceStamped(h, with_covariance(read))),
+    "TransformStamped": (TransformStamped, lambda h, read: transform(h, "tool0", read)),
+}
+
+
+# a stroke and more of the demo's 74 s
+PART = 20_000
+
+
+def row_of(one):
+    """Stamp, and all numbers of a PoseStamped or WrenchStamped."""
+    made = one.wrench if isinstance(one, WrenchStamped) else one.pose
+    return one.header.stamp.sec * 10**9 + one.header.stamp.nanosec, [number for part in astuple(made) for number in part]
+
+
+def assert_mesh_is_that_of(node, sent, scan, touchup, folder):
+    """The node recorded what was sent, as PoseStamped and WrenchStamped, and its mesh is what refine makes of that. Frames by topic.
+
+    - `sent`: of each topic stamps and numbers.
+    """
+    found, frames = {POSE: [], WRENCH: []}, {}
+    parts = sorted((node.session / "recording").glob("*.mcap"))
+    with AnyReader(parts, default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, _, payload in reader.messages():
+            stamp, frames[connection.topic], row = numbers(reader.deserialize(payload, connection.msgtype))
+            found[connection.topic].append((stamp, row))
+    assert found == sent
+    again = folder / "again.ply"
+    flags = ["--scan", scan, "--bag", node.session / "recording", "--scene", node.session / "scene.yaml", "--out", again]
+    done = touchup("refine", *flags)
+    assert done.returncode in (0, 4), done.stderr
+    assert (node.session / "refined.ply").read_bytes() == again.read_bytes()
+    return frames
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_pose_of_another_type_gives_the_mesh_of_the_same_poses(demo_folder, tmp_path, touchup, touchup_bin, domain, name):
+    kind, make = KINDS[name]
+    plain = recorded(demo_folder / "touch.mcap")[:PART]
+    played = recorded(demo_folder / "touch.mcap", {**STAMPED, POSE: (POSE, kind, make)})[:PART]
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
+        for _ in sent_in_step(node, domain, {POSE: kind, WRENCH: WrenchStamped}, played):
+            pass
+        assert node.end() in (0, 4), node.text()
+        report = node.report()
+    assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > PART / 2 and report["contacts"] > 0, report
+    sent = {POSE: [], WRENCH: []}
+    for topic, one in plain:
+        sent[topic].append(row_of(one))
+    assert_mesh_is_that_of(node, sent, demo_folder / "scan.ply", touchup, tmp_path)
+
+
+def test_transforms_of_unlike_rates_give_the_mesh_of_the_recording_that_has_them(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    """A link at the rate of the poses, and one at a tenth of it, which moves to and fro by 1 mm: together they are where the stylus was."""
+    name, frame = "tf2_msgs/msg/TFMessage", None
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    stamped = []
+    with AnyReader([demo_folder / "touch.mcap"], default_typestore=store) as reader:
+        for connection, _, payload in reader.messages():
+            read = reader.deserialize(payload, connection.msgtype)
+            stamped.append((*numbers(read), connection.topic, read))
+    begin = stamped[0][0]
+    path, published = tmp_path / "tf", []
+
+    def link(stamp, parent, child, position, turn):
+        seconds, rest = divmod(int(stamp), 10**9)
+        position, turn = [float(x) for x in position], [float(x) for x in turn]
+        published.append(
+            ((stamp, 0), "/tf", TFMessage([TransformStamped(Header(Time(seconds, rest), parent), child, Transform(Vector3(*position), Quaternion(*turn)))]))
+        )
+        header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](seconds, rest), parent)
+        made = types["geometry_msgs/msg/Transform"](types["geometry_msgs/msg/Vector3"](*position), types["geometry_msgs/msg/Quaternion"](*turn))
+        return types[name]([types["geometry_msgs/msg/TransformStamped"](header, child, made)])
+
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        transforms = writer.add_connection("/tf", name, typestore=store)
+        wrenches = writer.add_connection(WRENCH, "geometry_msgs/msg/WrenchStamped", typestore=store)
+        poses = 0
+        for stamp, of, row, topic, read in sorted(stamped, key=lambda one: one[0])[:PART]:
+            if topic == WRENCH:
+                writer.write(wrenches, stamp, bytes(store.serialize_cdr(read, read.__msgtype__)))
+                published.append(((stamp, 1), WRENCH, WrenchStamped(Header(Time(*divmod(stamp, 10**9)), of), wrench(read))))
+                continue
+            frame = of
+            shift = np.array([0.0, 0.0, 1e-3 * np.sin((stamp - begin) * 2e-9)])
+            rotation = Rotation.from_quat(row[3:])
+            made = [link(stamp, of, "arm", row[:3] - rotation.apply(shift), row[3:])]
+            if poses % 10 == 0:
+                made.append(link(stamp, "arm", "tool0", shift, [0, 0, 0, 1]))
+            poses += 1
+            for one in made:
+                writer.write(transforms, stamp, bytes(store.serialize_cdr(one, name)))
+    scene = scene_for(demo_folder, tmp_path)
+    flags = ["--scan", demo_folder / "scan.ply", "--bag", path, "--scene", scene, "--out", tmp_path / "refined.ply"]
+    done = touchup("refine", *flags, "--pose-frame", "tool0", "--base-frame", frame)
+    assert done.returncode in (0, 4), done.stderr
+    ros = [*CYCLONE, "-p", f"pose_frame:=tool0 in {frame}"]
+    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=ros) as node:
+        assert any("/tf" in line for line in node.out)
+        messages = [(topic, sent) for _, topic, sent in sorted(published, key=lambda one: one[0])]
+        for _ in sent_in_step(node, domain, {"/tf": TFMessage, WRENCH: WrenchStamped}, messages):
+            pass
+        assert node.end() in (0, 4), node.text()
+        report = node.report()
+    assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > PART / 2, report
+    assert (node.session / "refined.ply").read_bytes() == (tmp_path / "refined.ply").read_bytes()
+
+
+def test_what_has_no_stamp_counts_when_it_comes(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    """PoseWithCovarianceStamped as now, Wrench without a header."""
+    sent = {POSE: [], WRENCH: []}
+
+    def sending(topic, one):
+        def make():
+            stamp = time.time_ns()
+            sent[topic].append((stamp, row_of(one)[1]))
+            if topic == WRENCH:
+                return one.wrench
+            return PoseWithCovarianceStamped(Header(Time(*divmod(stamp, 10**9)), "cell"), PoseWithCovariance(one.pose, COVARIANCE))
+
+        return make
+
+    messages = [(topic, sending(topic, one)) for topic, one in recorded(demo_folder / "touch.mcap")[:PART]]
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
+        for _ in sent_in_step(node, domain, {POSE: PoseWithCovarianceStamped, WRENCH: Wrench}, messages):
+            pass
+        assert node.end() in (0, 4), node.text()
+        report = node.report()
+    assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > PART / 2, report
+    # when a wrench came only the node knows: behind when it was sent, and in that order
+    with AnyReader(sorted((node.session / "recording").glob("*.mcap")), default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        came = [numbers(reader.deserialize(payload, at.msgtype))[0] for at, _, payload in reader.messages() if at.topic == WRENCH]
+    assert came == sorted(came) and all(0 <= stamp - at < 10**9 for stamp, (at, _) in zip(came, sent[WRENCH], strict=True))
+    sent[WRENCH] = [(stamp, row) for stamp, (_, row) in zip(came, sent[WRENCH])]
+    frames = assert_mesh_is_that_of(node, sent, demo_folder / "scan.ply", touchup, tmp_path)
+    # in the axes of its sensor, as that of a recording is that has no header beside a pose with one
+    assert frames[WRENCH] == "stylus"
+
+
+def test_a_type_that_cannot_be_read_is_one_clear_error_until_one_comes_that_can(demo_folder, tmp_path, touchup_bin, domain):
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
+        peer, said = Peer(domain), []
+        diagnostics = peer.reader("/diagnostics", DiagnosticArray, RELIABLE)
+        wrong = peer.writer("/stylus/wrench", Temperature, BEST_EFFORT)
+
+        def says(*words):
+            said.extend((one.status[0].level, one.status[0].message) for one in diagnostics.take(10))
+            return any(level == 2 and all(word in text for word in words) for level, text in said)
+
+        names = ["/stylus/wrench", "somebody publishes sensor_msgs/msg/Temperature, not geometry_msgs/msg/WrenchStamped", "FrankaRobotState"]
+        node.wait_for(lambda: says("cannot read what is published", *names))
+        assert all(any(name in line for line in node.err) for name in names), node.text()
+        # who publishes what can be read is heard all the same
+        right = Peer(domain).writer("/stylus/wrench", Wrench, BEST_EFFORT)
+        node.wait_for(right.get_matched_subscriptions)
+        said.clear()
+        right.write(Wrench(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)))
+
+        def is_quiet():
+            said.extend((one.status[0].level, one.status[0].message) for one in diagnostics.take(10))
+            return said and "cannot read" not in said[-1][1]
+
+        node.wait_for(is_quiet)
+        assert wrong is not None
+        assert node.end() in (0, 4), node.text()
+
+
+def test_a_parameter_names_a_type_that_gives_a_pose(tmp_path, touchup_bin):
+    for value, words in [
+        ("sensor_msgs/msg/Imu", ["pose_type is sensor_msgs/msg/Imu, not geometry_msgs/msg/PoseStamped", "Odometry"]),
+        ("tf2_msgs/msg/TFMessage", ["pose_type is tf2_msgs/msg/TFMessage", "pose_frame"]),
+    ]:
+        done = subprocess.run(
+            [str(touchup_bin), "node", "--ros-args", "-p", f"pose_type:={value}"], capture_output=True, text=True, timeout=60, cwd=tmp_path
+        )
+        assert done.returncode == 2 and all(word in done.stderr for word in words), done.stderr
