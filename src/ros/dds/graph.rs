@@ -151,10 +151,11 @@ impl DdsGraph {
                 self.reported.retain(|guid| guid.prefix != id);
                 self.unmatch(|guid| guid.prefix == id);
             }
+            // what the node itself publishes there says nothing
+            Event::WriterDetected { writer }
+                if self.published.contains_key(&writer.topic_name) && writer.guid.prefix == self.own.prefix => {}
             Event::WriterDetected { writer } if self.published.contains_key(&writer.topic_name) => {
-                if writer.guid.prefix != self.own.prefix {
-                    self.note_published(writer.guid, &writer.topic_name, &writer.type_name);
-                }
+                self.note_published(writer.guid, &writer.topic_name, &writer.type_name);
             }
             Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
                 self.seen(other.guid, &other.topic_name, &other.type_name);
