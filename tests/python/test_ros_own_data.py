@@ -1,6 +1,6 @@
 """Poses and wrenches of any type that recordings may have, live: to the byte what the same numbers give as PoseStamped and WrenchStamped.
 
-CycloneDDS publishes; the node is not told the types, but finds them.
+CycloneDDS publishes; the node finds the types by itself.
 """
 
 import subprocess

@@ -137,7 +137,7 @@ pub fn read_recording<'py>(
     Ok(into)
 }
 
-/// Writes poses and wrenches as MCAP, on the topics that the command line reads unless it is told others.
+/// Writes poses and wrenches as MCAP, on the topics that the command line reads unless flags name others.
 #[pyfunction]
 pub fn write_recording(
     py: Python<'_>,

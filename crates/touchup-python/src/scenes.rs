@@ -24,7 +24,7 @@ impl SceneSource {
     /// The scene, checked.
     ///
     /// # Errors
-    /// As the command line: also where nobody told the radius of the ball.
+    /// As the command line: also where the radius of the ball is not known.
     pub fn read(&self) -> Result<Scene, CliError> {
         let (mut scene, text) = match self {
             Self::Text(text) => (Scene::from_yaml(text)?, text.clone()),
