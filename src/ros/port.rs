@@ -32,6 +32,8 @@ pub enum Arrival {
     ClickedPoint(PointStamped),
     /// `/clock`
     Clock(Clock),
+    /// a pose (0) or wrench (1) that is refused before its numbers are looked at: why, by the name of the reason, and when it came
+    Refused(usize, &'static str, Instant),
     /// a message that could not be read: its topic, and why
     Unreadable(&'static str, String),
     /// a service was called

@@ -6,7 +6,7 @@ use super::arguments::NodeConfig;
 use super::node::{as_pose, as_wrench};
 use super::parameters::CELL_FRAME;
 use super::port::Arrival;
-use crate::io::recording::{LiveMessage, LiveType, SampleKind};
+use crate::io::recording::{BadMessage, LiveMessage, LiveType, SampleKind};
 use crate::stylus::Message;
 
 /// A topic of poses or of wrenches.
@@ -74,13 +74,24 @@ impl SampleSource {
         }
     }
 
-    /// What goes to the node.
-    pub fn arrival(&self, read: LiveMessage) -> Arrival {
-        let frame = if read.frame.is_empty() { &self.frame } else { &read.frame };
-        match &read.message {
+    /// What goes to the node of a message on `topic`, read as `of`. A header that names no frame is refused there: only a type without
+    /// one is in the frame of the parameters.
+    pub fn arrival(&self, topic: &'static str, of: LiveType, read: Result<LiveMessage, BadMessage>) -> Arrival {
+        let LiveMessage { frame, message } = match read {
+            Ok(read) => read,
+            Err(BadMessage::Quaternion) => return self.refused("quaternion"),
+            Err(BadMessage::Stamp) => return self.refused("stamp"),
+            Err(bad) => return Arrival::Unreadable(topic, format!("{bad}, read as {}", of.name())),
+        };
+        let frame = if of.has_header() { &frame } else { &self.frame };
+        match &message {
             Message::Pose(pose) => Arrival::Pose(as_pose(pose, frame), Instant::now()),
             Message::Wrench(wrench) => Arrival::Wrench(as_wrench(wrench, frame), Instant::now()),
         }
+    }
+
+    fn refused(&self, reason: &'static str) -> Arrival {
+        Arrival::Refused(usize::from(self.kind == SampleKind::Wrench), reason, Instant::now())
     }
 }
 
@@ -122,18 +133,30 @@ mod tests {
     }
 
     #[test]
-    fn what_names_no_frame_is_in_that_of_the_parameters() {
-        let frame = |arguments: &[&str], own: &str| {
+    fn a_type_without_a_header_is_in_the_frame_of_the_parameters_and_no_other() {
+        let frame = |arguments: &[&str], of: &str, own: &str| {
             let wrench = StampedWrench { stamp_ns: 5, wrench: Wrench::default() };
             let read = LiveMessage { frame: own.to_owned(), message: Message::Wrench(wrench) };
-            match source(SampleKind::Wrench, arguments).unwrap().arrival(read) {
+            let of = LiveType::of(SampleKind::Wrench, of).unwrap();
+            match source(SampleKind::Wrench, arguments).unwrap().arrival("stylus/wrench", of, Ok(read)) {
                 Arrival::Wrench(wrench, _) => wrench.header.frame_id,
                 other => panic!("{other:?}"),
             }
         };
-        assert_eq!(frame(&[], "ft"), "ft");
-        assert_eq!(frame(&["source:=probe"], ""), "probe_sensor");
-        let unnamed = "pose_type:=geometry_msgs/msg/Pose";
-        assert_eq!(frame(&[unnamed], ""), "cell");
+        let (stamped, plain) = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/Wrench");
+        assert_eq!(frame(&[], stamped, "ft"), "ft");
+        assert_eq!(frame(&[], stamped, ""), "", "the node refuses it by name");
+        assert_eq!(frame(&["source:=probe"], plain, ""), "probe_sensor");
+        assert_eq!(frame(&["pose_type:=geometry_msgs/msg/Pose"], plain, ""), "cell");
+    }
+
+    #[test]
+    fn a_pose_that_is_no_rotation_counts_as_refused_and_one_that_is_no_message_as_unreadable() {
+        let poses = source(SampleKind::Pose, &[]).unwrap();
+        let of = poses.first_type();
+        let arrival = |bad| poses.arrival("stylus/pose", of, Err(bad));
+        assert!(matches!(arrival(BadMessage::Quaternion), Arrival::Refused(0, "quaternion", _)));
+        assert!(matches!(arrival(BadMessage::Stamp), Arrival::Refused(0, "stamp", _)));
+        assert!(matches!(arrival(BadMessage::Malformed), Arrival::Unreadable("stylus/pose", _)));
     }
 }

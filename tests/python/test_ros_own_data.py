@@ -199,7 +199,8 @@ def test_transforms_of_unlike_rates_give_the_mesh_of_the_recording_that_has_them
         for stamp, of, row, topic, read in sorted(stamped, key=lambda one: one[0])[:PART]:
             if topic == WRENCH:
                 writer.write(wrenches, stamp, bytes(store.serialize_cdr(read, read.__msgtype__)))
-                published.append(((stamp, 1), WRENCH, WrenchStamped(Header(Time(*divmod(stamp, 10**9)), of), wrench(read))))
+                # in the axes of the frame whose pose is taken, which is the frame of the tool unless it is named
+                published.append(((stamp, 1), WRENCH, WrenchStamped(Header(Time(*divmod(stamp, 10**9)), "tool0"), wrench(read))))
                 continue
             frame = of
             shift = np.array([0.0, 0.0, 1e-3 * np.sin((stamp - begin) * 2e-9)])

@@ -142,12 +142,14 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-/// Answers with a list: `lists!(Answer: list, what is left out of each of it first)`; then all of it goes.
+/// Answers with a list: `lists!(Answer: list, what is left out of each of it first, and next)`; then all of it goes.
 macro_rules! lists {
-    ($($answer:ty: $($list:ident).+, $shorten:expr;)+) => {
+    ($($answer:ty: $($list:ident).+ $(, $shorten:expr)*;)+) => {
         $(impl Shrinkable for $answer {
             fn reduce(&mut self, most: usize) {
-                self.$($list).+.iter_mut().for_each($shorten);
+                $(if size(self) > most {
+                    self.$($list).+.iter_mut().for_each($shorten);
+                })*
                 if size(self) > most {
                     self.$($list).+.clear();
                 }
@@ -158,11 +160,11 @@ macro_rules! lists {
 
 lists! {
     // a value for each name, or none
-    GetParametersResponse: values, |_| {};
-    GetParameterTypesResponse: types, |_| {};
-    ListParametersResponse: result.names, |_| {};
-    // types, ranges and words to choose from are what programs need
-    DescribeParametersResponse: descriptors, |one| one.description.clear();
+    GetParametersResponse: values;
+    GetParameterTypesResponse: types;
+    ListParametersResponse: result.names;
+    // types and ranges are what programs need, and words to choose from where they fit
+    DescribeParametersResponse: descriptors, |one| one.description.clear(), |one| one.additional_constraints.clear();
     // whether each is set comes before why not
     SetParametersResponse: results, |one| one.reason.clear();
 }
@@ -349,6 +351,10 @@ mod tests {
             println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
             assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
         }
+        // beside a network of smaller packets, as of machines in a cloud, names, types and ranges still are there
+        let mut without_words = described(names());
+        without_words.reduce(room(1400));
+        assert_eq!(without_words.descriptors.len(), PARAMETERS.len());
         // nothing but the descriptions is left out
         let of =
             |one: &messages::ParameterDescriptor| (one.name.clone(), one.r#type, one.additional_constraints.clone());

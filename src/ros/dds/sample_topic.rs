@@ -19,7 +19,6 @@ use crate::io::recording::{BadMessage, LiveMessage, LiveType};
 use crate::ros::clock::RosClock;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
-use crate::ros::port::Arrival;
 use crate::ros::sample_source::SampleSource;
 use crate::ros::topics::{SubscribesSamples, Topic};
 
@@ -129,11 +128,7 @@ impl Listener for SampleTopic {
             |(ReadMessage(read), info)| {
                 let lost = numbers.missing(info.publisher_gid(), info.sequence_number());
                 exchange.lost[*counter].fetch_add(lost, Ordering::Relaxed);
-                let arrival = match read {
-                    Ok(read) => source.arrival(read),
-                    Err(bad) => Arrival::Unreadable(name, format!("{bad}, read as {}", of.name())),
-                };
-                exchange.inbox.put(arrival);
+                exchange.inbox.put(source.arrival(name, *of, read));
             },
         );
     }

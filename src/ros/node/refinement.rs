@@ -198,6 +198,10 @@ impl RefinementWorker {
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
             // samples have their time in their stamps; the port has this one
             Arrival::Clock(_) => {}
+            Arrival::Refused(stream, reason, at) => {
+                self.streams[stream].arrive(self.setup.clock.now(), None, at);
+                self.session.counters.refuse(reason);
+            }
             Arrival::Unreadable(topic, why) => self.count_unreadable(topic, &why),
             Arrival::Call(call) => self.call(call),
             Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),

@@ -68,11 +68,7 @@ impl SubscribesSamples for R2rBackEnd<'_> {
         self.graph.watch_senders(whole, of.name(), profile);
         let (name, exchange) = (topic.name, self.exchange.clone());
         self.sources.push(source(messages, move |payload: Vec<u8>| {
-            let arrival = match of.decode(&payload, exchange.clock.now_ns()) {
-                Ok(read) => samples.arrival(read),
-                Err(bad) => Arrival::Unreadable(name, format!("{bad}, read as {}", of.name())),
-            };
-            exchange.inbox.put(arrival);
+            exchange.inbox.put(samples.arrival(name, of, of.decode(&payload, exchange.clock.now_ns())));
         }));
         Ok(())
     }
