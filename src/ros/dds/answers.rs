@@ -142,14 +142,17 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-/// Answers with a list: `lists!(Answer: list, what is left out of each of it first, and next)`; then all of it goes.
+/// Answers with a list: `lists!(Answer: list of what, [what is left out of each of it first, and next])`; then all of it goes.
 macro_rules! lists {
-    ($($answer:ty: $($list:ident).+ $(, $shorten:expr)*;)+) => {
+    ($($answer:ty: $($list:ident).+ of $item:ty, $steps:expr;)+) => {
         $(impl Shrinkable for $answer {
             fn reduce(&mut self, most: usize) {
-                $(if size(self) > most {
-                    self.$($list).+.iter_mut().for_each($shorten);
-                })*
+                let steps: &[fn(&mut $item)] = &$steps;
+                for shorten in steps {
+                    if size(self) > most {
+                        self.$($list).+.iter_mut().for_each(shorten);
+                    }
+                }
                 if size(self) > most {
                     self.$($list).+.clear();
                 }
@@ -160,13 +163,13 @@ macro_rules! lists {
 
 lists! {
     // a value for each name, or none
-    GetParametersResponse: values;
-    GetParameterTypesResponse: types;
-    ListParametersResponse: result.names;
+    GetParametersResponse: values of ParameterValue, [];
+    GetParameterTypesResponse: types of u8, [];
+    ListParametersResponse: result.names of String, [];
     // types and ranges are what programs need, and words to choose from where they fit
-    DescribeParametersResponse: descriptors, |one| one.description.clear(), |one| one.additional_constraints.clear();
+    DescribeParametersResponse: descriptors of ParameterDescriptor, [|one| one.description.clear(), |one| one.additional_constraints.clear()];
     // whether each is set comes before why not
-    SetParametersResponse: results, |one| one.reason.clear();
+    SetParametersResponse: results of SetParametersResult, [|one| one.reason.clear()];
 }
 
 #[cfg(test)]
