@@ -12,7 +12,7 @@ pub fn stamp_ns(time: Time) -> i64 {
 
 /// The nearest stamp that a message can have.
 pub fn time(stamp_ns: i64) -> Time {
-    let sec = stamp_ns.div_euclid(1_000_000_000).clamp(0, i64::from(i32::MAX));
+    let sec = stamp_ns.div_euclid(1_000_000_000).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32 }
 }
 
