@@ -266,7 +266,7 @@ p { margin: 0 0 10px; } .small { font-size: 13px; color: #4a5160; font-weight: 4
 table { border-collapse: collapse; width: 100%; font-size: 14px; }
 th { text-align: left; font-weight: 600; color: #4a5160; border-bottom: 2px solid #1d2129; padding: 5px 8px; vertical-align: bottom; }
 td { border-bottom: 1px solid #dfe3ea; padding: 5px 8px; vertical-align: top; } tr { break-inside: avoid; }
-.keys { width: auto; min-width: 50%; } .keys td:nth-child(n+2) { font-weight: 600; }
+.keys { width: auto; min-width: 50%; } .keys th, .keys td { overflow-wrap: anywhere; } .keys td:nth-child(n+2) { font-weight: 600; }
 .features td:nth-child(n+4):nth-child(-n+7), .features th:nth-child(n+4):nth-child(-n+7) { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 .features td:nth-child(-n+3), .features td:last-child { white-space: nowrap; }
 .still { color: #6b7280; }
