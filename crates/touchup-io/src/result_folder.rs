@@ -32,6 +32,21 @@ pub struct ClaimedFolder {
     _lock: Option<NameLock>,
 }
 
+/// Bytes as a file, for readers of files, in a folder of its own beside the one that is made. It vanishes when this is dropped; what a killed
+/// process leaves of it goes with the next claim of the name.
+#[derive(Debug)]
+pub struct FileBeside {
+    path: PathBuf,
+    _folder: TempDir,
+}
+
+impl FileBeside {
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
 /// A lock beside a folder, by its name.
 #[derive(Debug)]
 struct NameLock {
@@ -73,6 +88,22 @@ impl ClaimedFolder {
     /// Where its files are to be written.
     pub fn path(&self) -> &Path {
         self.temporary.path()
+    }
+
+    /// Bytes that it is made of, as a file.
+    ///
+    /// - `name`: has the ending that readers look at.
+    ///
+    /// # Errors
+    /// [`FileError::Write`]
+    pub fn file_beside(&self, name: &Path, bytes: &[u8]) -> Result<FileBeside, FileError> {
+        let written = || {
+            let folder = temporary_in(self.place.parent().unwrap_or(Path::new(".")), &self.prefix)?;
+            let path = folder.path().join(name.file_name().unwrap_or_default());
+            fs::write(&path, bytes)?;
+            Ok(FileBeside { path, _folder: folder })
+        };
+        written().map_err(|source| FileError::Write { path: name.to_owned(), source })
     }
 
     /// Gives the folder its name. Another one that has come there meanwhile stays, unless it is to be replaced.
@@ -190,8 +221,13 @@ mod tests {
         let results = tempfile::tempdir().unwrap();
         let claimed = ours(claim(results.path(), "a", false).unwrap());
         fs::write(claimed.path().join("x"), "1").unwrap();
+        let beside = claimed.file_beside(Path::new("far/scan.ply"), b"ply").unwrap();
+        assert!(beside.path().ends_with("scan.ply") && fs::read(beside.path()).unwrap() == b"ply");
+        let left = beside.path().parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
+        assert!(left.starts_with(".a.") && left.ends_with(PART), "{left}: the next claim removes it");
         assert!(!results.path().join("a").exists());
         claimed.publish(false).unwrap();
+        drop(beside);
         assert_eq!(names(results.path()), ["a"]);
         assert!(matches!(claim(results.path(), "a", false).unwrap(), Claim::Done(_)));
         let again = ours(claim(results.path(), "a", true).unwrap());

@@ -22,33 +22,3 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
 pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
     write_file(path, |out| out.write_all(text.as_bytes()))
 }
-
-/// Bytes as a file, for readers of files; it vanishes when this is dropped.
-#[derive(Debug)]
-pub struct TemporaryFile {
-    file: tempfile::NamedTempFile,
-}
-
-impl TemporaryFile {
-    /// - `name`: has the ending that readers look at.
-    ///
-    /// # Errors
-    /// [`FileError::Write`]
-    pub fn new(name: &Path, bytes: &[u8]) -> Result<Self, FileError> {
-        let ending = name.file_name().and_then(|name| Some(name.to_str()?.split_once('.')?.1));
-        let ending = ending.map_or(String::new(), |ending| format!(".{ending}"));
-        let write = || {
-            let mut file = tempfile::Builder::new().prefix("touchup-").suffix(&ending).tempfile()?;
-            file.write_all(bytes)?;
-            file.flush()?;
-            Ok(file)
-        };
-        let file = write().map_err(|source| FileError::Write { path: name.to_owned(), source })?;
-        Ok(Self { file })
-    }
-
-    /// Where it lies.
-    pub fn path(&self) -> &Path {
-        self.file.path()
-    }
-}

@@ -65,7 +65,7 @@ fn title(report: &WhatIfReport) -> String {
     match (keys.next(), keys.next()) {
         (Some((key, [a, b])), None) => format!("What if {key} is {} instead of {}?", shown(b), shown(a)),
         (None, _) => "Two results of the same inputs".to_owned(),
-        _ => format!("What if {} keys change?", report.keys.len()),
+        _ => format!("What if {} inputs change?", report.keys.len()),
     }
 }
 
@@ -114,7 +114,7 @@ fn keys(report: &WhatIfReport) -> String {
     };
     let rows: Vec<_> = report.keys.iter().map(row).collect();
     let of = |name: &str, which: &str| format!("{which} <span class=\"small\">{}</span>", escaped(name));
-    let head = ["Key".to_owned(), of(&report.a, "A"), of(&report.b, "B")];
+    let head = ["Input".to_owned(), of(&report.a, "A"), of(&report.b, "B")];
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     format!("<h2>What differs</h2>\n{}", table("keys", &head, &rows))
 }

@@ -56,7 +56,7 @@ def refine(
     - `scan`: a mesh, or the path of a file. `unit`: of its coordinates: ``"mm"`` for a file and ``"m"`` for arrays unless it is named.
     - `recording`: poses and wrenches, `Samples` (whose wrenches turn with the stylus), or the path of a ROS 2 recording, of which the
       topics and `stamp` are then read.
-    - `scene`: what differs from the usual cell. It must tell the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
+    - `scene`: what differs from the usual cell. It must name the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
     - `force`: refines also where something of the recording is surely wrong.
 
     Raises `TouchupError`, and warns with `TouchupWarning` of what is doubtful. The interpreter is free for other threads meanwhile.

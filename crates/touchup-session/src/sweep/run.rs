@@ -18,8 +18,8 @@ use crate::session::{OutcomeError, OutcomePlaces};
 use touchup_io::content_hash::{content_hash, hash_of};
 use touchup_io::features_file::read_features;
 use touchup_io::machine::VERSION;
-use touchup_io::result_folder::{Claim, ClaimedFolder, claim};
-use touchup_io::text_file::{TemporaryFile, read_text, write_text};
+use touchup_io::result_folder::{Claim, ClaimedFolder, FileBeside, claim};
+use touchup_io::text_file::{read_text, write_text};
 
 pub(super) const SUMMARY: &str = "summary.json";
 pub(super) const FAILED: &str = "failed.json";
@@ -64,7 +64,7 @@ pub struct JobRunner {
 struct InputFile {
     path: PathBuf,
     /// removes one that was made of given bytes
-    _temporary: Option<TemporaryFile>,
+    _given: Option<FileBeside>,
 }
 
 impl JobRunner {
@@ -98,8 +98,9 @@ impl JobRunner {
             Claim::Done(result) => return report(job, result, true),
             Claim::Ours(claimed) => claimed,
         };
-        let scan = self.input("the scan", &job.scan, &job.scan_sha256, given.scan)?;
-        let recording = self.input("the recording", &job.recording, &job.recording_sha256, given.recording)?;
+        let scan = self.input("the scan", (&job.scan, &job.scan_sha256), given.scan, &claimed)?;
+        let recording =
+            self.input("the recording", (&job.recording, &job.recording_sha256), given.recording, &claimed)?;
         let (scene, record) = self.scene(job)?;
         write_json(&claimed.path().join(RECORD), &record)?;
         let plain = |message: &str| {
@@ -119,7 +120,13 @@ impl JobRunner {
     }
 
     /// A file of a job, of which the content is what was planned.
-    fn input(&self, what: &str, path: &Path, planned: &str, given: Option<&[u8]>) -> Result<InputFile, SweepError> {
+    fn input(
+        &self,
+        what: &str,
+        (path, planned): (&Path, &str),
+        given: Option<&[u8]>,
+        claimed: &ClaimedFolder,
+    ) -> Result<InputFile, SweepError> {
         let path = self.folder.join(path);
         let found = match given {
             Some(bytes) => hash_of(bytes),
@@ -129,10 +136,9 @@ impl JobRunner {
             let what = format!("{what} {}", path.display());
             return Err(SweepError::Changed { what, found, planned: planned.to_owned() });
         }
-        let Some(bytes) = given else { return Ok(InputFile { path, _temporary: None }) };
-        // readers look at the ending
-        let temporary = TemporaryFile::new(&path, bytes)?;
-        Ok(InputFile { path: temporary.path().to_owned(), _temporary: Some(temporary) })
+        let Some(bytes) = given else { return Ok(InputFile { path, _given: None }) };
+        let file = claimed.file_beside(&path, bytes)?;
+        Ok(InputFile { path: file.path().to_owned(), _given: Some(file) })
     }
 
     /// Read once for all jobs.
