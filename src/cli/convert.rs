@@ -12,7 +12,7 @@ use super::recorded::RecordedFlags;
 use super::{CliError, Losses, check_kept, check_outputs, check_place, counted, print_report};
 use crate::io::features_file::read_features;
 use crate::io::recording::{CopiedRecording, RecordingReader, StampSource, Topics, copy_recording};
-use crate::io::result_table::ResultTable;
+use crate::io::result_table::{ResultTable, is_table};
 use crate::scene::Scene;
 
 #[derive(Debug, Args)]
@@ -75,8 +75,7 @@ impl fmt::Display for Converted {
 pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> {
     let ConvertArguments { input, out, scene, recorded, stamp, json } = arguments;
     check_kept("INPUT", input, out)?;
-    let ending = out.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
-    if ending == "csv" || ending == "parquet" {
+    if is_table(out) {
         check_place(out)?;
         return convert_results(input, out, *json);
     }
@@ -108,7 +107,7 @@ fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliEr
     let are_features = input.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let table = match are_features {
         true => ResultTable::of_features(&read_features(input)?.features),
-        false => ResultTable::of_touches(input)?,
+        false => ResultTable::of_touches_file(input)?,
     };
     table.write(out)?;
     let converted = ConvertedTable { rows: table.rows(), out: out.to_owned() };

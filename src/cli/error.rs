@@ -194,12 +194,9 @@ errors_of_rooms! {
     crate::mesh::MeshError => |_| ("mesh", 3), "";
     crate::io::recording::RecordingError => |_| ("recording", 3), "";
     crate::session::SessionError => |_| ("session", 3), "";
-    TouchesFileError => of_touches, "";
-    FeaturesFileError => of_features, "";
-    ResultTableError => |error| match error {
-        ResultTableError::Touches(error) => of_touches(error),
-        ResultTableError::File(_) | ResultTableError::Parquet(_) => NOT_WRITTEN,
-    }, "";
+    TouchesFileError => |_| ("touches", 3), "";
+    FeaturesFileError => |_| ("features", 3), "";
+    ResultTableError => |_| NOT_WRITTEN, "";
     NominalFileError => |error| match error {
         NominalFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
         _ => ("nominal", 3),
@@ -208,8 +205,7 @@ errors_of_rooms! {
         OutcomeError::WriteMesh(_) => NOT_WRITTEN,
         OutcomeError::ReadMesh(_) | OutcomeError::Mesh(_) => ("mesh", 3),
         OutcomeError::Unchanged => ("input", 3),
-        OutcomeError::Touches(error) => of_touches(error),
-        OutcomeError::Features(error) => of_features(error),
+        OutcomeError::Table(_) => NOT_WRITTEN,
     }, "";
     SimError => |error| match error {
         SimError::BadParameter { .. } | SimError::TooFine { .. } | SimError::TooCoarse { .. } => ("simulation", 2),
@@ -249,14 +245,6 @@ errors_of_rooms! {
 errors_of_rooms! {
     crate::ur::SetupError => |_| ("arm", 1), "";
     crate::ur::child::ChildError => |_| ("arm", 1), "";
-}
-
-fn of_touches(error: &TouchesFileError) -> (&'static str, u8) {
-    if matches!(error, TouchesFileError::File(FileError::Write { .. })) { NOT_WRITTEN } else { ("touches", 3) }
-}
-
-fn of_features(error: &FeaturesFileError) -> (&'static str, u8) {
-    if matches!(error, FeaturesFileError::File(FileError::Write { .. })) { NOT_WRITTEN } else { ("features", 3) }
 }
 
 impl From<SpotError> for CliError {

@@ -11,8 +11,9 @@ use super::{CliError, Losses, check_kept, counted, print_report, require};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
 use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
-use crate::io::features_file::{FeatureFile, write_features};
+use crate::io::features_file::FeatureFile;
 use crate::io::mesh_file::MeshUnit;
+use crate::io::result_table::write_features_as_named;
 use crate::io::touches_file::read_touches;
 use crate::mesh::TriMesh;
 use crate::scan::{Scan, read_scan};
@@ -38,8 +39,8 @@ pub(super) struct FeaturesArguments {
     /// paper: vertices of more Gaussian curvature than this belong to clusters, 1/mm²
     #[arg(long, value_name = "T", default_value_t = 0.3)]
     threshold_per_mm2: f64,
-    /// Output: the features as JSON
-    #[arg(long, value_name = "JSON")]
+    /// Output: the features: JSON, or a table, .csv or .parquet
+    #[arg(long, value_name = "FEATURES")]
     out: Option<PathBuf>,
     /// Prints the features as JSON
     #[arg(long)]
@@ -80,7 +81,7 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
     };
     let took_s = started.elapsed().as_secs_f64();
     if let Some(out) = &arguments.out {
-        write_features(out, &file)?;
+        write_features_as_named(out, &file)?;
     }
     let wrote = arguments.out.as_ref().map_or(String::new(), |out| format!("\nwrote {}", out.display()));
     print_report(arguments.json, &file, || format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}"))?;

@@ -82,11 +82,11 @@ pub(super) struct RefineArguments {
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(flatten)]
     web: WebFlags,
-    /// Output: the features of the refined mesh, measured by the touches, as JSON
-    #[arg(long, value_name = "JSON")]
+    /// Output: the features of the refined mesh, measured by the touches: JSON, or a table, .csv or .parquet
+    #[arg(long, value_name = "FEATURES")]
     features_out: Option<PathBuf>,
-    /// Output: the touches that features name, as CSV
-    #[arg(long, value_name = "CSV")]
+    /// Output: the touches that features name: .csv or .parquet
+    #[arg(long, value_name = "TOUCHES")]
     touches_out: Option<PathBuf>,
     /// Folder of a session of the node: takes scan, scene and touches from there, also after a crash, and writes refined.ply,
     /// features.json and touches.csv there unless they have places of their own

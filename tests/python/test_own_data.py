@@ -471,6 +471,24 @@ def test_touches_and_features_are_the_same_as_csv_and_as_parquet(touchup, demo_f
                 assert row[key] == value
 
 
+def test_refine_and_features_write_the_tables_that_convert_makes(touchup, demo_folder, tmp_path):
+    files = ["--scan", demo_folder / "scan.ply", "--bag", demo_folder / "touch.mcap", "--out", tmp_path / "refined.ply"]
+    tip = ["--tip-radius-mm", 1.5, "--stiffness-n-per-mm", 20]
+    for ending in ["csv", "parquet"]:
+        outs = ["--touches-out", tmp_path / f"touches.{ending}", "--features-out", tmp_path / f"features.{ending}"]
+        done = touchup("refine", *files, *outs, *tip)
+        assert done.returncode == 0, done.stderr
+        done = touchup("features", tmp_path / "refined.ply", "--touches", demo_folder / "touches.csv", "--out", tmp_path / f"again.{ending}")
+        assert done.returncode == 0, done.stderr
+        for name, of in [("touches", "touches.csv"), ("features", "features.json"), ("again", "features.json")]:
+            expected = demo_folder / of
+            if (of, ending) != ("touches.csv", "csv"):
+                expected = tmp_path / f"{of}.{ending}"
+                done = touchup("convert", demo_folder / of, "--out", expected)
+                assert done.returncode == 0, done.stderr
+            assert (tmp_path / f"{name}.{ending}").read_bytes() == expected.read_bytes(), f"{name}.{ending}"
+
+
 def test_a_table_refines_a_scan_to_the_same_bytes_as_the_recording_it_was_made_of(touchup, demo_folder, tmp_path):
     """Written by pandas with all digits, poses and wrenches one below the other as they were recorded."""
     columns = {

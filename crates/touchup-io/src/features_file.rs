@@ -279,9 +279,9 @@ impl FeatureFile {
 ///
 /// # Errors
 /// [`FileError::Write`].
-pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FeaturesFileError> {
+pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FileError> {
     let text = serde_json::to_string_pretty(file).expect("finite numbers and names alone cannot fail");
-    Ok(write_file(path, |out| writeln!(out, "{text}"))?)
+    write_file(path, |out| writeln!(out, "{text}"))
 }
 
 /// Reads features.

@@ -8,9 +8,10 @@ use serde_json::{Map, Value};
 
 use crate::atomic::write_atomically;
 use crate::csv_line::csv_line;
-use crate::features_file::FeatureRecord;
+use crate::features_file::{FeatureFile, FeatureRecord, write_features};
 use crate::file_error::FileError;
-use crate::touches_file::{self, TouchesFileError};
+use crate::touches_file::{self, TouchesFileError, write_touches};
+use touchup_core::stylus::ProbedPoint;
 
 mod parquet_file;
 
@@ -20,9 +21,6 @@ pub enum ResultTableError {
     /// The system refused.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The touches cannot be read.
-    #[error(transparent)]
-    Touches(#[from] TouchesFileError),
     /// Its columns do not make a file of Parquet.
     #[error("the table does not fit Parquet: {0}")]
     Parquet(#[from] ParquetError),
@@ -69,18 +67,27 @@ impl ResultTable {
         table
     }
 
-    /// A row for each touch, with the columns of a file of touches.
+    /// A row for each touch, with the columns and the digits of a file of touches.
+    pub fn of_touches(touches: &[ProbedPoint]) -> Self {
+        let mut table = Self::default();
+        let lines = touches.iter().enumerate().map(|(number, touch)| touches_file::line_of(touch, number));
+        lines.for_each(|line| table.add_touch(&line));
+        table
+    }
+
+    /// A row for each line of a file of touches.
     ///
     /// # Errors
-    /// [`ResultTableError::Touches`]
-    pub fn of_touches(path: &Path) -> Result<Self, ResultTableError> {
+    /// [`TouchesFileError`]
+    pub fn of_touches_file(path: &Path) -> Result<Self, TouchesFileError> {
         let mut table = Self::default();
-        for (number, touch) in touches_file::read_touches(path)?.iter().enumerate() {
-            let line = touches_file::line_of(touch, number);
-            let named = touches_file::HEADER.split(',').zip(line.split(','));
-            table.add_row(named.map(|(name, value)| (name.to_owned(), touch_cell(name, value))).collect());
-        }
+        touches_file::read_lines(path, |line| table.add_touch(line))?;
         Ok(table)
+    }
+
+    fn add_touch(&mut self, line: &str) {
+        let named = touches_file::HEADER.split(',').zip(line.split(',').map(str::trim));
+        self.add_row(named.map(|(name, value)| (name.to_owned(), touch_cell(name, value))).collect());
     }
 
     /// A row of values by their names, each name once; what is nested is named as of features, and `Null` is no value.
@@ -127,8 +134,7 @@ impl ResultTable {
     /// # Errors
     /// [`ResultTableError`]
     pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
-        let is_parquet = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
-        let bytes = if is_parquet { self.parquet()? } else { self.csv().into_bytes() };
+        let bytes = if has_ending(path, "parquet") { self.parquet()? } else { self.csv().into_bytes() };
         let written = write_atomically(path, |out| out.write_all(&bytes));
         Ok(written.map_err(|source| FileError::Write { path: path.to_owned(), source })?)
     }
@@ -141,6 +147,37 @@ impl ResultTable {
             text.push('\n');
         }
         text
+    }
+}
+
+/// Whether a file of this name is written as a table: CSV or Parquet.
+pub fn is_table(path: &Path) -> bool {
+    has_ending(path, "csv") || has_ending(path, "parquet")
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+}
+
+/// Writes features in the form that the ending names, as a whole or not at all: a table where it [is one](is_table), else JSON.
+///
+/// # Errors
+/// [`ResultTableError`]
+pub fn write_features_as_named(path: &Path, file: &FeatureFile) -> Result<(), ResultTableError> {
+    match is_table(path) {
+        true => ResultTable::of_features(&file.features).write(path),
+        false => Ok(write_features(path, file)?),
+    }
+}
+
+/// Writes touches in the form that the ending names, as a whole or not at all: Parquet, else a [file of touches](touches_file).
+///
+/// # Errors
+/// [`ResultTableError`]
+pub fn write_touches_as_named(path: &Path, touches: &[ProbedPoint]) -> Result<(), ResultTableError> {
+    match has_ending(path, "parquet") {
+        true => ResultTable::of_touches(touches).write(path),
+        false => Ok(write_touches(path, touches)?),
     }
 }
 

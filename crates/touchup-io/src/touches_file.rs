@@ -18,14 +18,14 @@ pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z
                           point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,place_mm,weight,\
                           rejected";
 
-/// Why a file of touches could not be read or written.
+/// Why a file of touches could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum TouchesFileError {
-    /// It could not be read or written.
+    /// The system refused.
     #[error(transparent)]
     File(#[from] FileError),
     /// Another header.
-    #[error("{} does not begin with the header of a file of touches, \"touch,stamp_ns,…\": make it by touchup refine --touches-out", path.display())]
+    #[error("{} does not begin with the header of a file of touches, \"touch,stamp_ns,…\": make it by touchup refine --touches-out FILE.csv", path.display())]
     NoTouches {
         /// the file
         path: PathBuf,
@@ -46,11 +46,11 @@ pub enum TouchesFileError {
 ///
 /// # Errors
 /// [`FileError::Write`].
-pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), TouchesFileError> {
-    Ok(write_file(path, |out| {
+pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), FileError> {
+    write_file(path, |out| {
         writeln!(out, "{HEADER}")?;
         touches.iter().enumerate().try_for_each(|(number, touch)| writeln!(out, "{}", line_of(touch, number)))
-    })?)
+    })
 }
 
 /// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is measured by them can be
@@ -77,6 +77,11 @@ pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
 /// # Errors
 /// [`TouchesFileError`], with the line.
 pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
+    read_lines(path, |_| ())
+}
+
+/// Reads touches, and gives the line of each as it is in the file.
+pub(crate) fn read_lines(path: &Path, mut line_read: impl FnMut(&str)) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let own = || path.to_owned();
     let text = read_file(path)?;
     let text = String::from_utf8_lossy(&text);
@@ -85,10 +90,11 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     if header != HEADER {
         return Err(TouchesFileError::NoTouches { path: own() });
     }
-    let mut touches: Vec<ProbedPoint> = Vec::new();
+    let mut touches = Vec::new();
     for (at, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let touch = touch_of(line, touches.len()).and_then(|touch| in_order(&touches, touch));
         touches.push(touch.map_err(|what| TouchesFileError::BadLine { path: own(), line: at + 2, what })?);
+        line_read(line);
     }
     Ok(touches)
 }

@@ -163,9 +163,9 @@ pub fn read_touches<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, 
     touches_array(py, &touches)
 }
 
-/// Writes touches as `refine --touches-out` does.
+/// Writes touches as `refine --touches-out` does: Parquet where the name ends so, else CSV.
 #[pyfunction]
 pub fn write_touches(py: Python<'_>, path: PathBuf, touches: &Bound<'_, PyDict>) -> PyResult<()> {
     let touches = touches_of(touches)?.map_err(|error| exception(py, error))?;
-    at_work(py, || Ok(touchup_io::touches_file::write_touches(&path, &touches)?))
+    at_work(py, || Ok(touchup_io::result_table::write_touches_as_named(&path, &touches)?))
 }

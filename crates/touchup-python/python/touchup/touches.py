@@ -51,7 +51,7 @@ class Touches:
         return Touches(**_touchup.read_touches(path))
 
     def write(self, path: Path) -> None:
-        """Writes that CSV."""
+        """Writes that CSV; Parquet where the name ends in ``.parquet``."""
         _touchup.write_touches(path, self._arrays())
 
     def _arrays(self) -> dict[str, Any]:

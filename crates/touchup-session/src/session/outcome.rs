@@ -17,10 +17,11 @@ use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId
 use touchup_core::numeric::counted;
 use touchup_core::reconstruct::{Patched, Patcher, Support};
 use touchup_core::stylus::ProbedPoint;
-use touchup_io::features_file::{FeatureFile, FeaturesFileError, write_features};
+use touchup_io::features_file::FeatureFile;
 use touchup_io::mesh_file::{MeshFile, MeshFileError, MeshUnit, VertexColumn};
 use touchup_io::mesh_file::{read_mesh, write_mesh_with};
-use touchup_io::touches_file::{TouchesFileError, as_written, write_touches};
+use touchup_io::result_table::{ResultTableError, write_features_as_named, write_touches_as_named};
+use touchup_io::touches_file::as_written;
 
 /// Why a result was not written.
 #[derive(Debug, thiserror::Error)]
@@ -31,12 +32,9 @@ pub enum OutcomeError {
     /// The mesh that was just written.
     #[error("{0}")]
     ReadMesh(MeshFileError),
-    /// The touches.
+    /// The touches or the features.
     #[error(transparent)]
-    Touches(#[from] TouchesFileError),
-    /// The features.
-    #[error(transparent)]
-    Features(#[from] FeaturesFileError),
+    Table(#[from] ResultTableError),
     /// The patch is too large.
     #[error(transparent)]
     Mesh(#[from] MeshError),
@@ -54,9 +52,9 @@ pub struct OutcomePlaces<'a> {
     pub unit: MeshUnit,
     /// the file of the scan: its colours and texture coordinates are carried over
     pub scan: &'a Path,
-    /// features of the refined mesh, measured by the touches
+    /// features of the refined mesh, measured by the touches: a table where the name ends in `.csv` or `.parquet`, else JSON
     pub features: Option<&'a Path>,
-    /// the touches that features name
+    /// the touches that features name: Parquet where the name ends so, else CSV
     pub touches: Option<&'a Path>,
     /// the rest of a scan of which a part was refined
     pub outside: Option<&'a Outside>,
@@ -296,11 +294,11 @@ impl OutcomePlaces<'_> {
     /// they are written, so that `touchup features` finds the same to the last bit.
     fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
         if let Some(out) = self.touches {
-            write_touches(out, touches)?;
+            write_touches_as_named(out, touches)?;
         }
         if let Some(out) = self.features {
             let MeshFile { mesh, .. } = read_mesh(self.mesh, self.unit).map_err(OutcomeError::ReadMesh)?;
-            write_features(out, &found(&mesh, &as_written(touches)).1)?;
+            write_features_as_named(out, &found(&mesh, &as_written(touches)).1)?;
         }
         Ok(())
     }
