@@ -3,8 +3,9 @@
     python crates/touchup-python/benches/push.py [SAMPLES]
 
 Of the installed wheel. What is compared with is a loop of Rust over the same arrays in the same process, `_push_in_rust`, which makes a
-sample of each row and pushes it. Times are of the processor, and the least of several rounds taken in turn, as anything else that runs only adds
-to them.
+sample of each row and pushes it. Times are of the processor. For single pushes they are the least of several rounds taken in turn, as anything
+else that runs only adds to them; for `push_many`, whose part is small, the ratio of each of many pairs is taken, and the median of these with its
+standard error.
 """
 
 import sys
@@ -13,7 +14,7 @@ import time
 import numpy as np
 import touchup
 
-ROUNDS = 9
+ROUNDS, PAIRS = 9, 80
 SIDE, RADIUS, STIFFNESS, FORCE = 0.1, 1.5e-3, 2e4, 2.0
 SCENE = {"tip": {"radius_mm": RADIUS * 1e3, "stiffness_n_per_mm": STIFFNESS / 1e3}, "scan": {"noise_mm": 0.1}}
 
@@ -37,6 +38,24 @@ def slide(count):
     return touchup.Samples(np.arange(count) * 1_000_000, position, np.tile([0.0, 0.0, FORCE], (count, 1)))
 
 
+def at_once(push, given):
+    started = time.thread_time()
+    push(given)
+    return time.thread_time() - started
+
+
+def pairs(mesh, samples, scene):
+    """By how much `push_many` takes longer than the loop of Rust, %, with the standard error of that."""
+    arrays, ratios = samples._arrays(), []
+    for at in range(PAIRS):
+        rust, many = touchup.Refiner(mesh, scene), touchup.Refiner(mesh, scene)
+        ways = [lambda: at_once(rust._push_in_rust, arrays), lambda: at_once(many.push_many, samples)]
+        first, second = (ways[turn]() for turn in ((0, 1) if at % 2 == 0 else (1, 0)))
+        ratios.append(second / first if at % 2 == 0 else first / second)
+    spread = 1.4826 * np.median(np.abs(ratios - np.median(ratios)))
+    return (np.median(ratios) - 1) * 100, 1.2533 * spread / np.sqrt(PAIRS) * 100
+
+
 def rounds(mesh, samples, scene):
     """The least time of each way, s."""
     arrays = samples._arrays()
@@ -55,14 +74,8 @@ def rounds(mesh, samples, scene):
             pass
         return time.thread_time() - started
 
-    def at_once(push, given):
-        started = time.thread_time()
-        push(given)
-        return time.thread_time() - started
-
     ways = {
         "rust": lambda refiner: at_once(refiner._push_in_rust, arrays),
-        "push_many": lambda refiner: at_once(refiner.push_many, samples),
         "push, arrays": lambda refiner: each(refiner.push, rows),
         "push, tuples": lambda refiner: each(refiner.push, tuples),
         "empty loop": lambda refiner: loop_alone(),
@@ -81,7 +94,7 @@ def main():
         least = rounds(mesh, samples, scene)
         rust = least["rust"]
         print(f"{what}: {len(mesh.faces)} faces, {count} samples; the engine takes {rust / count * 1e6:.3f} us a sample")
-        print(f"  push_many: {(least['push_many'] / rust - 1) * 100:+.2f} %")
+        print("  push_many: {:+.2f} ± {:.2f} %".format(*pairs(mesh, samples, scene)))
         for name in ("push, arrays", "push, tuples"):
             print(f"  {name}: {(least[name] - rust) / count * 1e6:+.3f} us (of it the loop {least['empty loop'] / count * 1e6:.3f})")
 

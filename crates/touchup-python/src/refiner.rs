@@ -20,8 +20,8 @@ use crate::failure::{at_work, exception, usage};
 use crate::refining::{Reported, ScanSource, refinement};
 use crate::scenes::source;
 
-/// Samples that are taken between two looks at whether the user has interrupted.
-const CHUNK: usize = 2048;
+/// Samples between two looks at whether the user has interrupted; as many as stay in the caches of a core.
+const CHUNK: usize = 1024;
 /// The number of a sample that was refused, where the others have that of their case.
 const REFUSED: u8 = 255;
 
