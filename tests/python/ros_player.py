@@ -61,10 +61,11 @@ def recorded(recording, streams=STAMPED):
     return [(topic, message) for _, topic, message in messages]
 
 
-def sent_in_step(node, domain, kinds, messages):
+def sent_in_step(node, domain, kinds, messages, window=WINDOW):
     """Sends messages, and yields each time that the node has taken what was sent. The node has `service_mapping:=cyclone`.
 
     - `kinds`: the type of each topic; `messages`: topic and message each, or topic and what makes the message when it is sent.
+    - `window`: messages that are sent at a time; fewer where they are larger than a sample.
     """
     peer = Peer(domain)
     writers = {topic: peer.writer(topic, kind, BEST_EFFORT) for topic, kind in kinds.items()}
@@ -73,8 +74,8 @@ def sent_in_step(node, domain, kinds, messages):
     state.introduce(0)
     # and has turned to their types
     node.wait_for(lambda: all(writer.get_matched_subscriptions() for writer in writers.values()))
-    for begin in range(0, len(messages), WINDOW):
-        for topic, message in messages[begin : begin + WINDOW]:
+    for begin in range(0, len(messages), window):
+        for topic, message in messages[begin : begin + window]:
             writers[topic].write(message() if callable(message) else message)
         state.ask(0)
         yield

@@ -6,6 +6,7 @@ The values of the messages are drawn at random; what touchup wrote is read again
 import csv
 import json
 
+import franka_state
 import numpy as np
 import pandas
 import pytest
@@ -362,77 +363,20 @@ def test_the_state_of_a_franka_holds_pose_and_wrench(touchup, tmp_path):
 
 
 def test_the_state_of_franka_ros2_holds_pose_and_wrench_each_with_its_frame(touchup, tmp_path):
-    """By the definition of franka_msgs 1.0 for ROS 2; one topic gives both, or the wrench comes from a sensor of its own."""
-    parts = {
-        "CollisionIndicators": "geometry_msgs/Vector3 a\ngeometry_msgs/Vector3 b\ngeometry_msgs/Vector3 c\ngeometry_msgs/Vector3 d\nfloat64[7] e\nfloat64[7] f",
-        "Elbow": "\n".join(f"float64[2] {name}" for name in ["position", "desired", "commanded", "velocity", "acceleration"]),
-        "Errors": "\n".join(f"bool error_{at}" for at in range(37)),
-    }
-    text = """std_msgs/Header header
-franka_msgs/CollisionIndicators collision_indicators
-sensor_msgs/JointState measured_joint_state
-sensor_msgs/JointState desired_joint_state
-sensor_msgs/JointState measured_joint_motor_state
-float64[7] ddq_d
-float64[7] dtau_j
-sensor_msgs/JointState tau_ext_hat_filtered
-franka_msgs/Elbow elbow
-geometry_msgs/WrenchStamped k_f_ext_hat_k
-geometry_msgs/WrenchStamped o_f_ext_hat_k
-geometry_msgs/InertiaStamped inertia_ee
-geometry_msgs/InertiaStamped inertia_load
-geometry_msgs/InertiaStamped inertia_total
-geometry_msgs/PoseStamped o_t_ee
-geometry_msgs/PoseStamped o_t_ee_d
-geometry_msgs/PoseStamped o_t_ee_c
-geometry_msgs/PoseStamped f_t_ee
-geometry_msgs/PoseStamped ee_t_k
-geometry_msgs/TwistStamped o_dp_ee_d
-geometry_msgs/TwistStamped o_dp_ee_c
-geometry_msgs/AccelStamped o_ddp_ee_c
-float64 time
-float64 control_command_success_rate
-uint8 robot_mode
-franka_msgs/Errors current_errors
-franka_msgs/Errors last_motion_errors
-"""
-    messages = Messages(Stores.ROS2_HUMBLE)
-    for name, part in parts.items():
-        messages.store.register(get_types_from_msg(part, f"franka_msgs/msg/{name}"))
-    state_type = "franka_msgs/msg/FrankaRobotState"
-    messages.store.register(get_types_from_msg(text, state_type))
-    random = np.random.default_rng(6)
-    fields = messages.store.get_msgdef(state_type).fields
-
-    def drawn(kind):
-        """A message of any type, its numbers drawn at random."""
-        made = {}
-        for name, (node, what) in messages.store.get_msgdef(kind).fields:
-            if node.name == "NAME":
-                made[name] = drawn(what)
-            elif node.name == "ARRAY":
-                made[name] = random.normal(size=what[1])
-            elif node.name == "SEQUENCE":
-                count = int(random.integers(0, 8))
-                made[name] = [f"joint{at}" * at for at in range(count)] if what[0][1][0] == "string" else random.normal(size=count)
-            elif what[0] in ("float64", "string", "bool"):
-                made[name] = {"float64": float(random.normal()), "string": "x" * int(random.integers(0, 9)), "bool": False}[what[0]]
-            else:
-                made[name] = int(random.integers(0, 9))
-        return messages.store.types[kind](**made)
-
+    """One topic gives both, or the wrench comes from a sensor of its own."""
+    messages, random = Messages(Stores.ROS2_HUMBLE), np.random.default_rng(6)
+    franka_state.register(messages.store)
     stamps, positions, rotations, wrenches = values(40)
-    assert len(fields) == 27
     rows = []
-    for at, (t, p, r, w) in enumerate(zip(stamps, positions, rotations, wrenches)):
-        state = drawn(state_type)
+    for t, p, r, w in zip(stamps, positions, rotations, wrenches):
+        state = franka_state.drawn(messages.store, random)
         state.header = messages.header(t, "base")
         state.o_t_ee = messages.of("geometry_msgs/msg/PoseStamped", header=messages.header(0, ""), pose=messages.pose(p, r))
         state.o_f_ext_hat_k = messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(0, "fr3_link0"), wrench=messages.wrench(w))
         rows.append((t, state))
     other = [(t, messages.of("geometry_msgs/msg/WrenchStamped", header=messages.header(t, "ft"), wrench=messages.wrench(-w))) for t, w in zip(stamps, wrenches)]
     topic = "/franka_robot_state_broadcaster/robot_state"
-    path = write(tmp_path, "mcap", messages, [(topic, state_type, rows), ("/ft", "geometry_msgs/msg/WrenchStamped", other)])
+    path = write(tmp_path, "mcap", messages, [(topic, franka_state.TYPE, rows), ("/ft", "geometry_msgs/msg/WrenchStamped", other)])
     for source, expected, frame in [(topic, wrenches, "fr3_link0"), ("/ft", -wrenches, "ft")]:
         poses, forces, _ = converted(touchup, tmp_path, path, "--pose-topic", topic, "--wrench-topic", source)
         assert_same(poses, stamps, np.hstack([positions, rotations.as_quat()]), "base", 1e-15)

@@ -5,8 +5,9 @@ CycloneDDS publishes; the node finds the types by itself.
 
 import subprocess
 import time
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
+import franka_state
 import numpy as np
 import pytest
 from cyclonedds.idl.types import array, float64, sequence
@@ -225,6 +226,40 @@ def test_transforms_of_unlike_rates_give_the_mesh_of_the_recording_that_has_them
         report = node.report()
     assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > PART / 2, report
     assert (node.session / "refined.ply").read_bytes() == (tmp_path / "refined.ply").read_bytes()
+
+
+def test_one_topic_of_a_franka_gives_pose_and_wrench(demo_folder, tmp_path, touchup, touchup_bin, domain):
+    """Its state has some 3 kB, which come in fragments; the force is in the axes of the base, as the pose."""
+    store, random = get_typestore(Stores.ROS2_HUMBLE), np.random.default_rng(7)
+    franka_state.register(store)
+    types = {}
+    kind, topic, base = franka_state.cyclone_types(store, types), "/franka_robot_state_broadcaster/robot_state", "cell"
+
+    def made(name, fields):
+        return types[name](**{field: value.tolist() if isinstance(value, np.ndarray) else value for field, value in fields.items()})
+
+    state = franka_state.drawn(store, random, made)
+    assert len(state.serialize()) > 2000
+    held, states, sent = None, [], {POSE: [], WRENCH: []}
+    for of, read in recorded(demo_folder / "touch.mcap")[:PART]:
+        if of == POSE:
+            held = read.pose
+        elif held is not None:
+            turn = Rotation.from_quat([getattr(held.orientation, axis) for axis in "xyzw"])
+            force, torque = ([float(x) for x in turn.apply(astuple(part))] for part in (read.wrench.force, read.wrench.torque))
+            at, one = Header(read.header.stamp, base), Wrench(Vector3(*force), Vector3(*torque))
+            stamped = {"o_t_ee": PoseStamped(at, held), "o_f_ext_hat_k": WrenchStamped(at, one)}
+            states.append((topic, replace(state, header=at, **stamped)))
+            sent[POSE].append(row_of(stamped["o_t_ee"]))
+            sent[WRENCH].append(row_of(stamped["o_f_ext_hat_k"]))
+    ros = [*CYCLONE, "-r", f"/stylus/pose:={topic}", "-r", f"/stylus/wrench:={topic}"]
+    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=ros) as node:
+        for _ in sent_in_step(node, domain, {topic: kind}, states, window=8):
+            pass
+        assert node.end() in (0, 4), node.text()
+        report = node.report()
+    assert report["lost"] == report["dropped"] == [0, 0] and report["accepted"] > len(states) / 2 and report["contacts"] > 0, report
+    assert_mesh_is_that_of(node, sent, demo_folder / "scan.ply", touchup, tmp_path)
 
 
 def test_what_has_no_stamp_counts_when_it_comes(demo_folder, tmp_path, touchup, touchup_bin, domain):
