@@ -2,11 +2,9 @@
 
 use clap::Args;
 
-use crate::io::recording::{RecordingLayout, Topics, TransformFrames};
+use crate::io::recording::{RecordingLayout, Topics};
+use crate::replay::RecordedAs;
 use crate::scene::Scene;
-
-/// Topic of the transforms, where no other is named.
-const TRANSFORMS: &str = "/tf";
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RecordedFlags {
@@ -38,15 +36,7 @@ impl From<Topics> for RecordedFlags {
 impl RecordedFlags {
     /// What they name, and the scene of the columns of a table.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
-        let own = Topics::default();
-        let pose_frame = self.pose_frame.as_ref();
-        let pose = if pose_frame.is_some() { TRANSFORMS.to_owned() } else { own.pose };
-        let topics = Topics {
-            pose: self.pose_topic.clone().unwrap_or(pose),
-            wrench: self.wrench_topic.clone().unwrap_or(own.wrench),
-            markers: self.markers_topic.clone(),
-        };
-        let frames = pose_frame.map(|moving| TransformFrames { moving: moving.clone(), base: self.base_frame.clone() });
-        RecordingLayout { topics, frames, columns: scene.table_columns() }
+        let Self { wrench_topic, pose_topic, pose_frame, base_frame, markers_topic } = self.clone();
+        RecordedAs { wrench_topic, pose_topic, pose_frame, base_frame, markers_topic, stamp: None }.layout(scene)
     }
 }

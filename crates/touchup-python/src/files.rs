@@ -9,7 +9,8 @@ use touchup::cli::CliError;
 use touchup_core::stylus::{Message, WrenchFrame};
 use touchup_io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns, write_mesh_with};
 use touchup_io::recording::{Record, StampSource, Topics};
-use touchup_session::replay::Recording;
+
+use touchup_session::replay::{RecordedAs, Recording};
 use touchup_session::scan::{Scan, read_scan};
 
 use crate::arrays::{
@@ -17,6 +18,7 @@ use crate::arrays::{
     touches_of, wrench_frame,
 };
 use crate::failure::{at_work, exception, usage, warn};
+use crate::scenes::source;
 
 /// The unit of a mesh file.
 ///
@@ -26,17 +28,14 @@ pub fn unit_of(name: &str) -> Result<MeshUnit, CliError> {
     MeshUnit::of_name(name).ok_or_else(|| usage(format!("unit {name:?} must be \"mm\", \"m\" or \"inch\"")))
 }
 
-/// The topics of a recording.
-pub fn topics(pose: String, wrench: String, markers: Option<String>) -> Topics {
-    Topics { pose, wrench, markers }
-}
-
-/// Which time of a message counts.
+/// Where in a recording the poses and wrenches are, as JSON.
 ///
 /// # Errors
-/// For another word.
-pub fn stamps_of(name: &str) -> Result<StampSource, CliError> {
-    StampSource::of_name(name).ok_or_else(|| usage(format!("stamp {name:?} must be \"header\" or \"log\"")))
+/// For a name that there is not.
+pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
+    let recorded: RecordedAs = serde_json::from_str(json).map_err(|error| usage(error.to_string()))?;
+    let stamps = recorded.stamps().map_err(usage)?;
+    Ok((recorded, stamps))
 }
 
 /// Reads a mesh, or a point cloud as one, and repairs it.
@@ -109,17 +108,19 @@ pub fn write_mesh(
     })
 }
 
-/// Reads a recording: poses, N, and wrenches, M, as arrays.
+/// Reads a recording of any kind: poses, N, and wrenches, M, as arrays.
 #[pyfunction]
 pub fn read_recording<'py>(
     py: Python<'py>,
+    scene_text: Option<String>,
+    scene_path: Option<PathBuf>,
     path: PathBuf,
-    pose_topic: String,
-    wrench_topic: String,
-    stamp: &str,
+    recorded: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let scene = source(scene_text, scene_path).map_err(|error| exception(py, error))?;
     let (all, frame, losses) = at_work(py, || {
-        let mut recording = Recording::open(&path, &topics(pose_topic, wrench_topic, None), stamps_of(stamp)?)?;
+        let (recorded, stamps) = recorded_as(recorded)?;
+        let mut recording = Recording::open(&path, recorded.layout(&scene.parsed()?.0), stamps)?;
         let (mut all, mut losses): (Vec<Message>, Vec<String>) = Default::default();
         while let Some(message) = recording.next_message() {
             match message {

@@ -14,13 +14,14 @@ use touchup_session::refinement::{
 };
 use touchup_session::replay::{Recording, marker_filter};
 use touchup_session::scan::read_scan;
+use touchup_session::scene::Scene;
 use touchup_session::session::RefinedMesh;
 
 use crate::arrays::{
     Compact, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages, touches_array, wrench_frame,
 };
 use crate::failure::{at_work, exception, usage, warn};
-use crate::files::{set_columns, stamps_of, topics, unit_of};
+use crate::files::{recorded_as, set_columns, unit_of};
 use crate::scenes::{SceneSource, shown, source};
 
 /// A scan as it is given.
@@ -142,12 +143,12 @@ enum Touching {
 fn refined(
     scan: ScanSource,
     scene: &SceneSource,
-    touching: impl FnOnce() -> Result<Touching, CliError>,
+    touching: impl FnOnce(&Scene) -> Result<Touching, CliError>,
     force: bool,
 ) -> Result<(Reported, Vec<String>), CliError> {
     let scan_name = if let ScanSource::File(path, _) = &scan { path.clone() } else { shown(None, "the scan") };
     let input = input_of(scan, scene)?;
-    let (touches, recording_name) = match touching()? {
+    let (touches, recording_name) = match touching(&input.scene)? {
         Touching::File { recording, path, markers } => {
             let markers = marker_filter(&input.scene, markers.as_deref())?.map(Box::new);
             (TouchSource::Recorded { recording, markers }, path)
@@ -178,7 +179,7 @@ pub fn refine<'py>(
     poses: Option<PoseArrays<'_>>,
     wrenches: Option<WrenchArrays<'_>>,
     frame: &str,
-    recording_file: Option<(PathBuf, String, String, Option<String>, String)>,
+    recording_file: Option<(PathBuf, String)>,
     force: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let read = || {
@@ -190,12 +191,12 @@ pub fn refine<'py>(
     };
     let (scan, scene, all) = read().map_err(|error| exception(py, error))?;
     let (reported, losses) = at_work(py, || {
-        let touching = || match (all, recording_file) {
+        let touching = |scene: &Scene| match (all, recording_file) {
             (Some((all, frame)), None) => Ok(Touching::Messages { all, frame }),
-            (None, Some((path, pose, wrench, markers, stamp))) => {
-                let topics = topics(pose, wrench, markers.clone());
-                let recording = Box::new(Recording::open(&path, &topics, stamps_of(&stamp)?)?);
-                Ok(Touching::File { recording, path, markers })
+            (None, Some((path, recorded))) => {
+                let (recorded, stamps) = recorded_as(&recorded)?;
+                let recording = Box::new(Recording::open(&path, recorded.layout(scene), stamps)?);
+                Ok(Touching::File { recording, path, markers: recorded.markers_topic })
             }
             _ => Err(usage("a recording is a Recording of arrays, or the path of a file".to_owned())),
         };

@@ -21,15 +21,23 @@ pub enum SceneSource {
 }
 
 impl SceneSource {
+    /// The scene and its text.
+    ///
+    /// # Errors
+    /// As the command line.
+    pub fn parsed(&self) -> Result<(Scene, String), CliError> {
+        match self {
+            Self::Text(text) => Ok((Scene::from_yaml(text)?, text.clone())),
+            Self::File(path) => Ok(Scene::read_with_text(path)?),
+        }
+    }
+
     /// The scene, checked.
     ///
     /// # Errors
-    /// As the command line: also where the radius of the ball is not known.
+    /// As [`Self::parsed`], and where the radius of the ball is not known.
     pub fn read(&self) -> Result<Scene, CliError> {
-        let (mut scene, text) = match self {
-            Self::Text(text) => (Scene::from_yaml(text)?, text.clone()),
-            Self::File(path) => Scene::read_with_text(path)?,
-        };
+        let (mut scene, text) = self.parsed()?;
         scene.tell_radius(&text, None).map_err(|error| match error {
             SceneError::NoRadius => CliError {
                 kind: "usage",

@@ -40,6 +40,38 @@ def test_files_make_the_same_mesh_as_arrays(refined, touched_files):
     assert np.array_equal(again.mesh.vertices, refined.mesh.vertices)
 
 
+OWN_COLUMNS = {"time": "when_s", "position": ["px_mm", "py_mm", "pz_mm"], "force": ["a_N", "b_N", "c_N"]}
+
+
+def test_a_table_is_read_by_the_columns_that_the_scene_names(tmp_path):
+    samples, table, scene = slide(0.2e-3), tmp_path / "own.csv", {**SCENE, "columns": OWN_COLUMNS}
+    names = [OWN_COLUMNS["time"], *OWN_COLUMNS["position"], *OWN_COLUMNS["force"]]
+    rows = zip(samples.stamp_ns * 1e-9, samples.position * 1e3, samples.force)
+    lines = [",".join(map(repr, map(float, (stamp, *position, *force)))) for stamp, position, force in rows]
+    table.write_text("\n".join([",".join(names), *lines]), encoding="utf-8")
+    read = touchup.Recording.read(table, scene=scene)
+    assert np.array_equal(read.pose_stamp_ns, samples.stamp_ns) and np.array_equal(read.wrench_stamp_ns, samples.stamp_ns)
+    assert np.allclose(read.position, samples.position, rtol=0, atol=1e-15) and np.array_equal(read.force, samples.force)
+    by_file, by_arrays = (touchup.refine(plate(), of, scene, force=True) for of in (table, read))
+    assert np.array_equal(by_file.mesh.vertices, by_arrays.mesh.vertices)
+    with pytest.raises(touchup.TouchupError, match="px_mm"):
+        touchup.Recording.read(table)
+
+
+def test_names_that_do_not_go_together_are_refused(touched_files):
+    file, scan = touched_files / "touch.mcap", plate()
+    for message, named in [
+        ("name pose_frame", {"base_frame": "base"}),
+        ("leave out pose_topic", {"markers_topic": "/markers", "pose_topic": "/pose"}),
+        ("must be header or log", {"stamp": "Header"}),
+        ("/stylus/pose", {"pose_topic": "/nowhere"}),
+    ]:
+        with pytest.raises(touchup.TouchupError, match=message):
+            touchup.refine(scan, file, SCENE, **named)
+    with pytest.raises(touchup.TouchupError, match="the recording is arrays"):
+        touchup.refine(scan, slide(0.2e-3), SCENE, pose_topic="/pose")
+
+
 def test_what_was_touched_is_nearer_to_the_part_than_the_scan(ring, touched, refined):
     before = touchup.compare(touched.scan, touchup.Mesh.of(ring, "mm")).region()["vertices_to_truth"]["rms_mm"]
     touched_part = touchup.compare(refined.mesh, touchup.Mesh.of(ring, "mm")).region("touched")

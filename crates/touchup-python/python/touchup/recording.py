@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,12 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from . import _touchup
 from ._arrays import error, floats, stamps
 from .mesh import Path
+from .scene import SceneLike, given
 
-POSE_TOPIC, WRENCH_TOPIC = "/stylus/pose", "/stylus/wrench"
+Stamp = Literal["header", "log"]
 PoseArrays = tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]
 SampleArrays = tuple[
     NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]
+
+
+def recorded_as(**names: str | None) -> str:
+    """Where in a recording the poses and wrenches are, as the native half takes it."""
+    return json.dumps({key: name for key, name in names.items() if name is not None})
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +61,26 @@ class Recording:
     @staticmethod
     def read(
         path: Path,
-        pose_topic: str = POSE_TOPIC,
-        wrench_topic: str = WRENCH_TOPIC,
-        stamp: Literal["header", "log"] = "header",
+        *,
+        scene: SceneLike = None,
+        pose_topic: str | None = None,
+        wrench_topic: str | None = None,
+        pose_frame: str | None = None,
+        base_frame: str | None = None,
+        stamp: Stamp = "header",
     ) -> Recording:
-        """Reads a ROS 2 recording, MCAP or SQLite, a file or a folder.
+        """Reads a recording of any kind that ``touchup refine`` reads: of ROS 2 or ROS 1, or a table.
 
+        - `pose_topic`, `wrench_topic`: ``"/stylus/pose"`` and ``"/stylus/wrench"`` unless they are named.
+        - `pose_frame`: takes the pose of this frame from the transforms on `pose_topic`, ``"/tf"`` unless it is named, in `base_frame`
+          or in the root of the tree.
         - `stamp`: which time of a message counts: that of its header, or when it was recorded.
+        - `scene`: names the `columns` of a table; nothing else of it counts.
         """
-        return Recording(**_touchup.read_recording(path, pose_topic, wrench_topic, stamp))
+        recorded = recorded_as(
+            pose_topic=pose_topic, wrench_topic=wrench_topic, pose_frame=pose_frame, base_frame=base_frame, stamp=stamp
+        )
+        return Recording(**_touchup.read_recording(*given(scene), path, recorded))
 
     def write(self, path: Path) -> None:
         """Writes MCAP that rosbag2 and ``touchup refine --bag`` read."""

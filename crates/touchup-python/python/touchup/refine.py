@@ -6,13 +6,13 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike, fspath
-from typing import Any, Literal, Union
+from typing import Any, Union
 
 from . import _touchup
-from ._arrays import MeshArrays
+from ._arrays import MeshArrays, error
 from .features import Features, features
 from .mesh import Mesh, MeshLike, Path, Unit
-from .recording import POSE_TOPIC, WRENCH_TOPIC, Recording, Samples
+from .recording import Recording, Samples, Stamp, recorded_as
 from .scene import SceneLike, given
 from .touches import Touches
 
@@ -45,17 +45,21 @@ def refine(
     scene: SceneLike = None,
     *,
     unit: Unit | None = None,
-    pose_topic: str = POSE_TOPIC,
-    wrench_topic: str = WRENCH_TOPIC,
+    pose_topic: str | None = None,
+    wrench_topic: str | None = None,
     markers_topic: str | None = None,
-    stamp: Literal["header", "log"] = "header",
+    pose_frame: str | None = None,
+    base_frame: str | None = None,
+    stamp: Stamp = "header",
     force: bool = False,
 ) -> Refined:
     """Refines a scan by touches, as ``touchup refine`` does.
 
     - `scan`: a mesh, or the path of a file. `unit`: of its coordinates: ``"mm"`` for a file and ``"m"`` for arrays unless it is named.
-    - `recording`: poses and wrenches, `Samples` (whose wrenches turn with the stylus), or the path of a ROS 2 recording, of which the
-      topics and `stamp` are then read.
+    - `recording`: poses and wrenches, `Samples` (whose wrenches turn with the stylus), or the path of a recording: of ROS 2 or
+      ROS 1, or a table.
+    - `pose_topic`, `wrench_topic`, `pose_frame`, `base_frame`, `stamp`: of a file, as of `Recording.read`. `markers_topic`: of the
+      markers that give the pose.
     - `scene`: what differs from the usual cell. It must name the radius of the ball: ``{"tip": {"radius_mm": 1.5}}``.
     - `force`: refines also where something of the recording is surely wrong.
 
@@ -66,10 +70,14 @@ def refine(
     frame: str = "sensor"
     if isinstance(recording, Samples):
         recording = recording.recording()
+    topics = {"pose_topic": pose_topic, "wrench_topic": wrench_topic, "markers_topic": markers_topic}
+    recorded = recorded_as(**topics, pose_frame=pose_frame, base_frame=base_frame, stamp=None if stamp == "header" else stamp)
     if isinstance(recording, Recording):
+        if recorded != recorded_as():
+            raise error(f"{recorded} say where poses and wrenches are in a file, and the recording is arrays: leave them out")
         poses, wrenches, frame = recording._poses(), recording._wrenches(), recording.wrench_frame
     else:
-        file = (fspath(recording), pose_topic, wrench_topic, markers_topic, stamp)
+        file = (fspath(recording), recorded)
     made = _touchup.refine(*given(scene), scan_arrays, scan_file, poses, wrenches, frame, file, force)
     return refined(made)
 

@@ -7,8 +7,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::error::SweepError;
-use super::job::RecordedAs;
 use super::sampling::{KeyValues, Sampling};
+use crate::replay::RecordedAs;
 use crate::scene::yaml_error;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::text_file::read_text;

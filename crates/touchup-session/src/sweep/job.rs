@@ -7,10 +7,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::SweepError;
-use crate::scene::Scene;
+use crate::replay::RecordedAs;
 use touchup_io::json_lines::JsonLines;
 use touchup_io::mesh_file::MeshUnit;
-use touchup_io::recording::{RecordingLayout, StampSource, Topics, TransformFrames};
 
 /// One refinement of a plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,64 +45,6 @@ pub struct Job {
     pub seed: Option<u64>,
     /// by path in the scene
     pub keys: BTreeMap<String, Value>,
-}
-
-/// Where in a recording the poses and wrenches are, as the flags of `touchup refine` name it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RecordedAs {
-    /// `--pose-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose_topic: Option<String>,
-    /// `--wrench-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wrench_topic: Option<String>,
-    /// `--markers-topic`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub markers_topic: Option<String>,
-    /// `--pose-frame`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose_frame: Option<String>,
-    /// `--base-frame`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub base_frame: Option<String>,
-    /// `--stamp`
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stamp: Option<String>,
-}
-
-/// Topic of the transforms, where no other is named.
-const TRANSFORMS: &str = "/tf";
-
-impl RecordedAs {
-    fn is_usual(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// With the columns of a table that the scene names.
-    pub(super) fn layout(&self, scene: &Scene) -> RecordingLayout {
-        let own = Topics::default();
-        let pose = if self.pose_frame.is_some() { TRANSFORMS.to_owned() } else { own.pose };
-        let topics = Topics {
-            pose: self.pose_topic.clone().unwrap_or(pose),
-            wrench: self.wrench_topic.clone().unwrap_or(own.wrench),
-            markers: self.markers_topic.clone(),
-        };
-        let frames = self.pose_frame.clone().map(|moving| TransformFrames { moving, base: self.base_frame.clone() });
-        RecordingLayout { topics, frames, columns: scene.table_columns() }
-    }
-
-    /// Which time of a message counts.
-    ///
-    /// # Errors
-    /// Where it is no word for one.
-    pub(super) fn stamps(&self) -> Result<StampSource, String> {
-        match self.stamp.as_deref() {
-            None | Some("header") => Ok(StampSource::Header),
-            Some("log") => Ok(StampSource::Log),
-            Some(other) => Err(format!("recorded.stamp is {other}; it must be header or log")),
-        }
-    }
 }
 
 /// The jobs of a file, in its order, read one at a time.

@@ -18,7 +18,7 @@ mod table;
 mod what_if;
 
 pub use error::SweepError;
-pub use job::{Job, JobsFile, RecordedAs};
+pub use job::{Job, JobsFile};
 pub use plan::{MOST_JOBS, SweepPlan};
 pub use record::{JobRecord, read_record};
 pub use run::{GivenInput, JobReport, JobRunner};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::SweepError;
-use super::job::RecordedAs;
+use crate::replay::RecordedAs;
 use touchup_io::content_hash::hash_of;
 use touchup_io::machine::VERSION;
 use touchup_io::mesh_file::MeshUnit;

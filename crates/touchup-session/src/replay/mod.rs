@@ -11,6 +11,10 @@ use touchup_io::recording::{Record, RecordingError, RecordingLayout, RecordingRe
 
 use crate::scene::Scene;
 
+mod recorded_as;
+
+pub use recorded_as::RecordedAs;
+
 /// Why a recording was not replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
