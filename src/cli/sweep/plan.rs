@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses, check_kept, check_place, counted, not_written, print_result};
 use crate::io::atomic::AtomicFile;
 use crate::sweep::{JobsFile, SweepPlan};
@@ -30,7 +31,7 @@ pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError
             print_result(&format!("wrote {0}: {jobs}; touchup sweep run {0}", path.display()))?;
         }
         None => {
-            let plan = SweepPlan::read(grid, recordings, Path::new(""))?;
+            let plan = checked(grid, recordings, Path::new(""))?;
             let mut out = stdout().lock();
             write_jobs(&plan, &mut out, Path::new("stdout"))?;
             match out.flush() {
@@ -52,21 +53,29 @@ pub fn plan_sweep(grid: &Path, recordings: &[PathBuf], out: &Path) -> Result<u64
     check_kept("GRID.yaml", grid, out)?;
     recordings.iter().try_for_each(|recording| check_kept("RECORDING", recording, out))?;
     check_place(out)?;
-    let plan = SweepPlan::read(grid, recordings, &JobsFile::folder(out))?;
+    let plan = checked(grid, recordings, &JobsFile::folder(out))?;
     let mut file = AtomicFile::create(out).map_err(not_written(out))?;
     write_jobs(&plan, &mut file, out)?;
     file.commit().map_err(not_written(out))?;
     Ok(plan.count())
 }
 
+/// Every setting is checked: of many that takes its time.
+fn checked(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<SweepPlan, CliError> {
+    let _checking = WorkProgress::stage("check");
+    Ok(SweepPlan::read(grid, recordings, folder)?)
+}
+
 /// Stops where nobody reads any more.
 fn write_jobs(plan: &SweepPlan, out: &mut impl Write, path: &Path) -> Result<(), CliError> {
+    let mut progress = WorkProgress::new("plan", Some(plan.count()));
     for job in plan.jobs() {
         let line = serde_json::to_string(&job?).expect("numbers and names alone cannot fail");
         match writeln!(out, "{line}") {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
             written => written.map_err(not_written(path))?,
         }
+        progress.step();
     }
     Ok(())
 }
