@@ -1,4 +1,4 @@
-"""Runs the jobs of ``touchup sweep plan`` on Ray: ``pip install touchup[ray]``, then ``python -m touchup.ray jobs.jsonl``.
+"""Runs the jobs of ``touchup sweep plan`` on Ray, which the extra `ray` of the wheel brings: ``python -m touchup.ray jobs.jsonl``.
 
 Results are those of ``touchup sweep run``, byte for byte, and ``touchup sweep table`` reads them. Every machine of a cluster must see the
 files of the jobs and the folder of the results under the same paths.
