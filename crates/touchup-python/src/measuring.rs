@@ -15,11 +15,13 @@ use touchup_core::compare::{
 };
 use touchup_core::features::detect;
 use touchup_core::mesh::{FaceTree, TriMesh};
+use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::session::found;
 use touchup_session::threads::Threads;
 
-use crate::arrays::{MeshArrays, json as to_json, matrix, mesh_of, of_equal_length, rows, touches_of};
+use crate::arrays::{MeshArrays, json as to_json, matrix, mesh_of, mesh_vecs, of_equal_length, rows, touches_of};
 use crate::failure::{at_work, exception, usage};
+use crate::scenes::shown;
 
 /// Points of the mesh that are brought onto the truth.
 const POINTS: f64 = 100_000.0;
@@ -30,9 +32,13 @@ const POINTS_EACH: f64 = 20_000.0;
 #[pyfunction]
 #[pyo3(signature = (mesh, touches))]
 pub fn features(py: Python<'_>, mesh: MeshArrays<'_>, touches: Option<&Bound<'_, PyDict>>) -> PyResult<String> {
-    let mesh = mesh_of(&mesh, "the mesh").map_err(|error| exception(py, error))?;
+    let (vertices, faces) = mesh_vecs(&mesh, "the mesh").map_err(|error| exception(py, error))?;
     let touches = touches.map(touches_of).transpose()?.transpose().map_err(|error| exception(py, error))?;
-    at_work(py, || to_json(&found(&mesh, &touches.unwrap_or_default()).1))
+    at_work(py, || {
+        // others keep a corner of each triangle by itself, which makes an edge of every side
+        let MeshFile { mesh, .. } = repaired(&shown(None, "the mesh"), MeshUnit::Metre, vertices, faces)?;
+        to_json(&found(&mesh, &touches.unwrap_or_default()).1)
+    })
 }
 
 /// A mesh and the tree over its faces.

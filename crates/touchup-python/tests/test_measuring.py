@@ -15,6 +15,14 @@ def test_the_hole_of_a_ring_has_its_diameter(ring):
     assert abs(hole["axis"][2]) == pytest.approx(1.0, abs=1e-9)
 
 
+def test_corners_that_each_triangle_has_by_itself_are_one(ring):
+    soup = ring.triangles.reshape(-1, 3), np.arange(3 * len(ring.faces)).reshape(-1, 3)
+    found, expected = (touchup.features(of, unit="mm")["features"] for of in (soup, ring))
+    assert [of["kind"] for of in found] == [of["kind"] for of in expected] and len(expected) == 4
+    with pytest.raises(touchup.TouchupError, match="too large for a work-piece"):
+        touchup.features(ring)  # mm taken for m
+
+
 def test_touches_measure_the_hole_better_than_the_scan(ring, refined):
     holes = [of for of in refined.features["features"] if of["kind"] == "hole"]
     assert holes and min(abs(hole["diameter_mm"] - 8.0) for hole in holes) < 0.05

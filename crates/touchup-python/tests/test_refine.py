@@ -3,6 +3,7 @@
 import sys
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -56,6 +57,38 @@ def test_a_table_is_read_by_the_columns_that_the_scene_names(tmp_path):
     assert np.array_equal(by_file.mesh.vertices, by_arrays.mesh.vertices)
     with pytest.raises(touchup.TouchupError, match="px_mm"):
         touchup.Recording.read(table)
+
+
+def test_what_is_doubtful_is_warned_of():
+    """A plane that is touched in strokes by a leaning hand whose forces turn with the stylus, with orientations of the other direction."""
+    samples = slide(0.2e-3, count=8000)
+    lean = np.stack([40 + 20 * np.sin(np.arange(8000) / 700), 30 * np.cos(np.arange(8000) / 900)], axis=1) * np.pi / 360
+    sine, cosine = np.sin(lean), np.cos(lean)
+    # about x, then about y
+    turn = np.stack([sine[:, 0] * cosine[:, 1], cosine[:, 0] * sine[:, 1], -sine[:, 0] * sine[:, 1], cosine[:, 0] * cosine[:, 1]], axis=1)
+    x, y, z, w = turn.T
+    # force along z of the scan, in the axes of the tip
+    up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
+    right = touchup.Samples(samples.stamp_ns, samples.position, 2.0 * up, turn)
+    wrong = touchup.Samples(samples.stamp_ns, samples.position, 2.0 * up, turn * [-1, -1, -1, 1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", touchup.TouchupWarning)
+        assert not touchup.refine(plate(), right, SCENE).summary["findings"]
+    with pytest.warns(touchup.TouchupWarning, match="wrench"):
+        doubtful = touchup.refine(plate(), wrong, SCENE, force=True)
+    assert doubtful.summary["findings"]
+
+
+def test_arrays_that_hold_no_numbers_are_refused():
+    samples = slide(0.2e-3, count=10)
+    hidden = np.ma.array(samples.position, mask=np.zeros((10, 3), bool))
+    assert np.array_equal(touchup.Samples(samples.stamp_ns, hidden, samples.force).position, samples.position)
+    hidden[3, 1] = np.ma.masked
+    for position, message in [(hidden, "masked"), (samples.position.astype(str), "of numbers"), (samples.position > 0, "of numbers")]:
+        with pytest.raises(touchup.TouchupError, match=message):
+            touchup.Samples(samples.stamp_ns, position, samples.force)
+    with pytest.raises(touchup.TouchupError, match="touchup.Samples, not tuple"):
+        touchup.Refiner(plate(), SCENE).push_many((samples.stamp_ns, samples.position, samples.force))
 
 
 def test_names_that_do_not_go_together_are_refused(touched_files):

@@ -18,7 +18,12 @@ def error(message: str, kind: str = "usage", exit_code: int = 2) -> TouchupError
 
 
 def floats(given: ArrayLike, columns: int, name: str) -> NDArray[np.float64]:
-    """An array (N, `columns`) of float64; one that is that already is not copied."""
+    """An array (N, `columns`) of float64; one that is that already is not copied. What is no number is refused."""
+    if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
+        raise error(f"{name} has masked values, which stand for no number: leave their rows out")
+    kind = np.asarray(given).dtype
+    if not (np.issubdtype(kind, np.integer) or np.issubdtype(kind, np.floating)):
+        raise error(f"{name} is an array of {kind}; it must be of numbers")
     array = np.ascontiguousarray(given, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != columns:
         raise error(f"{name} is an array of shape {array.shape}; it must be (N, {columns})")

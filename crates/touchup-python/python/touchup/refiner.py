@@ -87,6 +87,8 @@ class Refiner(_touchup.Refiner):
 
     def push_many(self, samples: Samples) -> Pushed:
         """Takes samples one after the other; a refused one is counted and changes nothing. Ctrl-C ends it between samples."""
+        if not isinstance(samples, Samples):
+            raise error(f"samples are touchup.Samples, not {type(samples).__name__}: make them of arrays, Samples(stamp_ns, position, force)")
         return Pushed(**self._push_many(samples._arrays()))
 
     def events(self, samples: Samples, chunk: int = 1000) -> Iterator[Event]:
@@ -122,6 +124,9 @@ class Refiner(_touchup.Refiner):
 
     def finish(self, *, force: bool = False) -> Refined:
         """Reconstructs what was touched; the refiner takes no more samples.
+
+        What came is not judged, as `refine` does it: wrong forces, frames or a wrong radius are not noticed, and `summary` has no
+        `findings`. Give a recording of the same samples to `refine` where you do not know them to be right.
 
         - `force`: also where no face of the scan was moved or replaced.
         """
