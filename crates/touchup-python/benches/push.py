@@ -3,7 +3,7 @@
     python crates/touchup-python/benches/push.py [SAMPLES]
 
 Of the installed wheel. What is compared with is a loop of Rust over the same arrays in the same process, `_push_in_rust`, which makes a
-sample of each row and pushes it. Times are of the processor. For single pushes they are the least of several rounds taken in turn, as anything
+sample of each row and pushes it into the same refinement, which judges it too. Times are of the processor. For single pushes they are the least of several rounds taken in turn, as anything
 else that runs only adds to them; for `push_many`, whose part is small, the ratio of each of many pairs is taken, and the median of these with its
 standard error.
 """

@@ -13,11 +13,11 @@ use touchup::cli::CliError;
 use touchup_core::haptic::{Case, Mismatch};
 use touchup_core::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
-use touchup_session::refinement::{Refinement, reason_of_refusal};
+use touchup_session::refinement::{JudgedRefinement, reason_of_refusal};
 
 use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
 use crate::failure::{at_work, exception, usage};
-use crate::refining::{Reported, ScanSource, refinement};
+use crate::refining::{ScanSource, finish_refinement, refinement};
 use crate::scenes::source;
 
 /// Samples between two looks at whether the user has interrupted; as many as stay in the caches of a core.
@@ -134,9 +134,9 @@ impl Pushed {
     }
 
     #[inline]
-    fn push(&mut self, refinement: &mut Refinement, sample: &Result<Sample, SampleError>) {
+    fn push(&mut self, refinement: &mut JudgedRefinement, sample: &Result<Sample, SampleError>) {
         let updated = match sample {
-            Ok(sample) => refinement.engine.push(sample),
+            Ok(sample) => refinement.push(sample),
             Err(error) => Err(LiveError::Refine((*error).into())),
         };
         match updated {
@@ -168,19 +168,19 @@ impl Pushed {
 #[pyclass(frozen, subclass, module = "touchup._touchup")]
 pub struct Refiner {
     /// nothing once it was finished
-    refinement: Mutex<Option<Refinement>>,
+    refinement: Mutex<Option<JudgedRefinement>>,
 }
 
 impl Refiner {
     /// Another thread may be at work, which needs the interpreter for nothing.
-    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Option<Refinement>> {
+    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Option<JudgedRefinement>> {
         match self.refinement.try_lock() {
             Ok(guard) => guard,
             Err(_) => self.refinement.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
         }
     }
 
-    fn in_use<T>(&self, py: Python<'_>, with: impl FnOnce(&mut Refinement) -> PyResult<T>) -> PyResult<T> {
+    fn in_use<T>(&self, py: Python<'_>, with: impl FnOnce(&mut JudgedRefinement) -> PyResult<T>) -> PyResult<T> {
         match self.locked(py).as_mut() {
             Some(refinement) => with(refinement),
             None => Err(exception(py, finished())),
@@ -273,7 +273,7 @@ impl Refiner {
             Ok(sample) => sample,
             Err(error) => return Err(exception(py, LiveError::Refine(error.into()).into())),
         };
-        self.in_use(py, |refinement| match refinement.engine.push(&sample) {
+        self.in_use(py, |refinement| match refinement.push(&sample) {
             Ok(update) => Ok(Update { update }),
             Err(error) => Err(exception(py, error.into())),
         })
@@ -315,7 +315,7 @@ impl Refiner {
         self.in_use(py, |refinement| {
             let pushed = rows.part(0..rows.len()).filter(|sample| {
                 let Ok(sample) = sample else { return false };
-                std::hint::black_box(refinement.engine.push(std::hint::black_box(sample))).is_ok()
+                std::hint::black_box(refinement.push(std::hint::black_box(sample))).is_ok()
             });
             Ok(pushed.count())
         })
@@ -323,7 +323,7 @@ impl Refiner {
 
     /// The mesh as the samples so far have moved it.
     fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.engine.mesh())))?;
+        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.refinement.engine.mesh())))?;
         let into = PyDict::new(py);
         compact.into_dict(&into)?;
         Ok(into)
@@ -331,13 +331,13 @@ impl Refiner {
 
     /// What became of the samples so far, by name.
     fn _counts(&self, py: Python<'_>) -> PyResult<String> {
-        let counts = self.in_use(py, |refinement| Ok(*refinement.engine.refiner().counts()))?;
+        let counts = self.in_use(py, |refinement| Ok(*refinement.refinement.engine.refiner().counts()))?;
         crate::arrays::json(&counts).map_err(|error| exception(py, error))
     }
 
     /// Reconstructs what was touched; the refiner takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
         let refinement = self.locked(py).take().ok_or_else(|| exception(py, finished()))?;
-        at_work(py, || Ok(Reported::from(refinement.finish(force)?)))?.into_dict(py)
+        at_work(py, || finish_refinement(refinement, force))?.into_dict(py)
     }
 }

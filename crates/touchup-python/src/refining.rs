@@ -10,7 +10,7 @@ use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Message, WrenchFrame};
 use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::refinement::{
-    FinishedRefinement, InputNames, RefinedScan, Refinement, RefinementInput, TouchSource, refine as refine_scan,
+    FinishedRefinement, InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource, refine as refine_scan,
 };
 use touchup_session::replay::{Recording, marker_filter};
 use touchup_session::scan::read_scan;
@@ -67,8 +67,8 @@ fn input_of(scan: ScanSource, scene: &SceneSource) -> Result<RefinementInput, Cl
 ///
 /// # Errors
 /// As `touchup refine`.
-pub fn refinement(scan: ScanSource, scene: &SceneSource, frame: WrenchFrame) -> Result<Refinement, CliError> {
-    Ok(Refinement::new(input_of(scan, scene)?, frame)?)
+pub fn refinement(scan: ScanSource, scene: &SceneSource, frame: WrenchFrame) -> Result<JudgedRefinement, CliError> {
+    Ok(JudgedRefinement::new(input_of(scan, scene)?, frame)?)
 }
 
 /// A refined scan and its report.
@@ -77,12 +77,17 @@ pub struct Reported {
     summary: Map<String, Value>,
 }
 
-impl From<FinishedRefinement> for Reported {
-    fn from(finished: FinishedRefinement) -> Self {
+impl From<RefinedScan> for Reported {
+    fn from(refined: RefinedScan) -> Self {
+        let RefinedScan { finished, replayed, accepted, refused, findings } = refined;
         let FinishedRefinement { mesh, counts, friction } = finished;
         let friction = friction.map(|found| json!({ "mu": found.mu, "sigma": found.sigma }));
         let mut summary = Map::new();
         let mut note = |name: &str, value: Value| summary.insert(name.to_owned(), value);
+        note("samples", replayed.wrenches.into());
+        note("accepted", accepted.into());
+        note("refused", json!(refused));
+        note("findings", value(&findings));
         note("contacts", counts.contacts.into());
         note("cut_back", counts.cut_back.into());
         note("friction", friction.unwrap_or(Value::Null));
@@ -92,19 +97,6 @@ impl From<FinishedRefinement> for Reported {
             note("uncertainty", value(uncertainty));
         }
         Self { mesh, summary }
-    }
-}
-
-impl From<RefinedScan> for Reported {
-    fn from(refined: RefinedScan) -> Self {
-        let RefinedScan { finished, replayed, accepted, refused, findings } = refined;
-        let mut reported = Self::from(finished);
-        for (name, number) in [("samples", replayed.wrenches), ("accepted", accepted)] {
-            reported.summary.insert(name.to_owned(), number.into());
-        }
-        reported.summary.insert("refused".to_owned(), json!(refused));
-        reported.summary.insert("findings".to_owned(), value(&findings));
-        reported
     }
 }
 
@@ -159,9 +151,23 @@ fn refined(
     };
     let names = InputNames { scan: &scan_name, recording: &recording_name };
     let mut refined = refine_scan(input, touches, names, force, &mut || {})?;
-    refined.findings.iter().for_each(|finding| tracing::warn!("{finding}"));
     let losses = std::mem::take(&mut refined.replayed.losses);
-    Ok((refined.into(), losses))
+    Ok((warned(refined), losses))
+}
+
+/// Judges and reconstructs what was pushed.
+///
+/// # Errors
+/// As [`refine`].
+pub fn finish_refinement(refinement: JudgedRefinement, force: bool) -> Result<Reported, CliError> {
+    let (scan, recording) = (shown(None, "the scan"), shown(None, "the samples"));
+    Ok(warned(refinement.finish(InputNames { scan: &scan, recording: &recording }, force)?))
+}
+
+/// Says what is doubtful.
+fn warned(refined: RefinedScan) -> Reported {
+    refined.findings.iter().for_each(|finding| tracing::warn!("{finding}"));
+    refined.into()
 }
 
 /// Refines a scan by a recording: of both either arrays or files.

@@ -105,3 +105,28 @@ def test_arrays_that_differ_in_length_are_refused():
 def test_stamps_in_seconds_are_refused():
     with pytest.raises(touchup.TouchupError, match="1e9"):
         touchup.Samples(np.array([0.0, 0.001]), np.zeros((2, 3)), np.zeros((2, 3)))
+
+
+def test_what_was_pushed_is_judged_as_a_recording_is():
+    samples = slide(0.2e-3)
+    refiner = touchup.Refiner(plate(), SCENE, wrench_frame="object")
+    refiner.push_many(samples)
+    finished, refined = refiner.finish(force=True), touchup.refine(plate(), samples.recording("object"), SCENE, force=True)
+    assert np.array_equal(finished.mesh.vertices, refined.mesh.vertices)
+    # the pairing of a recording needs a pose on both sides
+    assert finished.summary["findings"] == refined.summary["findings"]
+    assert finished.summary["samples"] == len(samples) == finished.summary["accepted"] and finished.summary["refused"] == {}
+
+
+def test_forces_of_the_wrong_sign_are_refused_at_the_end():
+    samples = slide(0.2e-3)
+    for push in ("push_many", "push"):
+        refiner = touchup.Refiner(plate(), SCENE)
+        reverse = touchup.Samples(samples.stamp_ns, samples.position, -samples.force)
+        if push == "push_many":
+            refiner.push_many(reverse)
+        else:
+            for row in zip(*reverse._arrays()):
+                refiner.push(*row)
+        with pytest.raises(touchup.TouchupError, match="force"):
+            refiner.finish()

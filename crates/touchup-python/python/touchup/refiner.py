@@ -125,9 +125,8 @@ class Refiner(_touchup.Refiner):
     def finish(self, *, force: bool = False) -> Refined:
         """Reconstructs what was touched; the refiner takes no more samples.
 
-        What came is not judged, as `refine` does it: wrong forces, frames or a wrong radius are not noticed, and `summary` has no
-        `findings`. Give a recording of the same samples to `refine` where you do not know them to be right.
+        What came is judged as by `refine`: raises `TouchupError` where something is surely wrong, and warns of what is doubtful.
 
-        - `force`: also where no face of the scan was moved or replaced.
+        - `force`: also where something is surely wrong, or no face of the scan was moved or replaced.
         """
         return refined(self._finish(force))

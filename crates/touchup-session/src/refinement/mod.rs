@@ -11,12 +11,17 @@ use crate::scene::{CutScan, RegionCut, Scene, SceneError};
 use crate::session::{OutcomeError, RefinedMesh};
 use crate::threads::Threads;
 use touchup_core::diagnose::{InputFinding, InputMonitor};
-use touchup_core::haptic::{RefineCounts, RefineError, RefineParams, Refiner};
+use touchup_core::haptic::{RefineCounts, RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_core::stylus::{
-    ContactEstimator, ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
+    ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, StampedPose, StampedWrench,
+    WrenchFrame,
 };
+
+mod watch;
+
+use watch::InputWatch;
 
 /// What is said of a scene in which nothing moves the mesh.
 pub const NOTHING_MOVES: &str = "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
@@ -155,22 +160,15 @@ impl RefinementInput {
         at_each: &mut dyn FnMut(),
     ) -> Result<JudgedReplay, ReplayError> {
         let (placement, sync) = (self.scene.placement(), self.scene.sync_params());
-        let monitor = RefCell::new(InputMonitor::new(self.scene.input_monitor_params(touches.wrench_frame()))?);
-        // an update that takes every sample for contact says nothing about contact
-        let mut observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
-        let mut at_message = |message: &Message| monitor.borrow_mut().message(message);
+        let watch = InputWatch::new(self.scene.input_monitor_params(touches.wrench_frame()), params)?;
+        let watch = RefCell::new(watch);
+        let mut at_message = |message: &Message| watch.borrow_mut().monitor.message(message);
         let each = |sample: &Sample| {
             if !taker.take(sample) {
                 return;
             }
-            let contact = match &mut observer {
-                Some(observer) => observer.observe(sample).ok().copied(),
-                None => taker.refiner().contact().copied(),
-            };
-            let mut monitor = monitor.borrow_mut();
-            monitor.sample(sample);
+            let contact = watch.borrow_mut().sample(sample, taker.refiner());
             if let Some(contact) = &contact {
-                monitor.contact(contact);
                 taker.observe(contact);
             }
         };
@@ -183,7 +181,7 @@ impl RefinementInput {
                 each_sample_of(messages, wrench_frame, placement, sync, &mut at_message, each)?
             }
         };
-        Ok(JudgedReplay { replayed, monitor: monitor.into_inner() })
+        Ok(JudgedReplay { replayed, monitor: watch.into_inner().monitor })
     }
 }
 
@@ -252,7 +250,7 @@ impl SampleTaker for CountingTaker<'_> {
     fn take(&mut self, sample: &Sample) -> bool {
         match self.engine.push(sample) {
             Ok(_) => self.accepted += 1,
-            Err(error) => *self.refused.entry(reason_of_refusal(&error).to_owned()).or_default() += 1,
+            Err(error) => count_refusal(&mut self.refused, &error),
         }
         true
     }
@@ -297,6 +295,99 @@ pub struct RefinedScan {
     pub findings: Vec<InputFinding>,
 }
 
+/// What became of all samples.
+struct JudgedSamples {
+    monitor: InputMonitor,
+    replayed: Replayed,
+    accepted: u64,
+    refused: BTreeMap<String, u64>,
+}
+
+impl JudgedSamples {
+    fn finish(
+        self,
+        refinement: Refinement,
+        names: InputNames<'_>,
+        force: bool,
+    ) -> Result<RefinedScan, RefinementError> {
+        let Self { monitor, mut replayed, accepted, mut refused } = self;
+        let scan = &refinement.input.scan;
+        let findings = monitor.findings(scan, &FaceTree::new_by(scan, &Threads));
+        if !force {
+            refuse_unsound(&findings, names)?;
+            if accepted == 0 {
+                return Err(RefinementError::NoSample { recording: names.recording.to_owned() });
+            }
+        }
+        refused.append(&mut replayed.refused);
+        let finished = refinement.finish(force)?;
+        let outside_region = finished.counts.outside_region;
+        if outside_region > 0 {
+            refused.insert("outside_region".to_owned(), outside_region);
+        }
+        Ok(RefinedScan { finished, replayed, accepted: accepted - outside_region, refused, findings })
+    }
+}
+
+/// A refinement whose samples are pushed.
+#[derive(Debug)]
+pub struct JudgedRefinement {
+    /// engine and input
+    pub refinement: Refinement,
+    watch: InputWatch,
+    accepted: u64,
+    refused: BTreeMap<String, u64>,
+}
+
+impl JudgedRefinement {
+    /// Nothing touched yet.
+    ///
+    /// # Errors
+    /// Those of [`Refinement::new`]; [`RefinementError::Setting`].
+    pub fn new(input: RefinementInput, wrench_frame: WrenchFrame) -> Result<Self, RefinementError> {
+        let (params, _) = input.settings(wrench_frame).ok_or(RefinementError::NothingMoves)?;
+        let monitor = input.scene.input_monitor_params(wrench_frame);
+        let watch = InputWatch::new(monitor, &params)?;
+        Ok(Self { refinement: Refinement::new(input, wrench_frame)?, watch, accepted: 0, refused: BTreeMap::new() })
+    }
+
+    /// Takes the next sample; a refused one is counted and changes nothing.
+    ///
+    /// # Errors
+    /// [`LiveError`] where it is refused.
+    #[inline]
+    pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
+        let update =
+            self.refinement.engine.push(sample).inspect_err(|error| count_refusal(&mut self.refused, error))?;
+        let Sample { stamp_ns, pose_ot, wrench } = *sample;
+        self.watch.monitor.message(&Message::Pose(StampedPose { stamp_ns, pose_ot }));
+        self.watch.monitor.message(&Message::Wrench(StampedWrench { stamp_ns, wrench }));
+        self.watch.sample(sample, self.refinement.engine.refiner());
+        self.accepted += 1;
+        Ok(update)
+    }
+
+    /// Judges what came, and reconstructs what was touched.
+    ///
+    /// - `names`: for messages. `force`: also where something is surely wrong, or no face is moved.
+    ///
+    /// # Errors
+    /// [`RefinementError`]
+    pub fn finish(self, names: InputNames<'_>, force: bool) -> Result<RefinedScan, RefinementError> {
+        let Self { refinement, watch, accepted, refused } = self;
+        let wrenches = accepted + refused.values().sum::<u64>();
+        let replayed = Replayed { wrenches, ..Replayed::default() };
+        let samples = JudgedSamples { monitor: watch.monitor, replayed, accepted, refused };
+        samples.finish(refinement, names, force)
+    }
+}
+
+/// Counts it by its reason.
+#[cold]
+fn count_refusal(refused: &mut BTreeMap<String, u64>, error: &LiveError) {
+    *refused.entry(reason_of_refusal(error).to_owned()).or_default() += 1;
+}
+
 /// Refines a scan by a recording.
 ///
 /// - `force`: also where something is surely wrong, or no face is moved.
@@ -315,22 +406,9 @@ pub fn refine(
     let (params, _) = input.settings(wrench_frame).ok_or(RefinementError::NothingMoves)?;
     let Refinement { mut engine, input } = Refinement::new(input, wrench_frame)?;
     let mut taker = CountingTaker { engine: &mut engine, accepted: 0, refused: BTreeMap::new() };
-    let JudgedReplay { mut replayed, monitor } = input.replay(touches, &params, &mut taker, at_each)?;
-    let CountingTaker { accepted, mut refused, .. } = taker;
-    let findings = monitor.findings(&input.scan, &FaceTree::new_by(&input.scan, &Threads));
-    if !force {
-        refuse_unsound(&findings, names)?;
-        if accepted == 0 {
-            return Err(RefinementError::NoSample { recording: names.recording.to_owned() });
-        }
-    }
-    refused.append(&mut replayed.refused);
-    let finished = Refinement { engine, input }.finish(force)?;
-    let outside_region = finished.counts.outside_region;
-    if outside_region > 0 {
-        refused.insert("outside_region".to_owned(), outside_region);
-    }
-    Ok(RefinedScan { finished, replayed, accepted: accepted - outside_region, refused, findings })
+    let JudgedReplay { replayed, monitor } = input.replay(touches, &params, &mut taker, at_each)?;
+    let CountingTaker { accepted, refused, .. } = taker;
+    JudgedSamples { monitor, replayed, accepted, refused }.finish(Refinement { engine, input }, names, force)
 }
 
 /// Refuses an input of which something is surely wrong.
