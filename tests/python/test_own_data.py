@@ -367,6 +367,7 @@ def test_the_state_of_franka_ros2_holds_pose_and_wrench_each_with_its_frame(touc
     messages, random = Messages(Stores.ROS2_HUMBLE), np.random.default_rng(6)
     franka_state.register(messages.store)
     stamps, positions, rotations, wrenches = values(40)
+    assert len(messages.store.get_msgdef(franka_state.TYPE).fields) == 27
     rows = []
     for t, p, r, w in zip(stamps, positions, rotations, wrenches):
         state = franka_state.drawn(messages.store, random)
