@@ -5,12 +5,11 @@ from rosbags.typesys import get_types_from_msg
 from ros_cyclone import message
 
 TYPE = "franka_msgs/msg/FrankaRobotState"
-ERRORS = 37
 
 _PARTS = {
     "CollisionIndicators": "\n".join(f"geometry_msgs/Vector3 {name}" for name in "abcd") + "\nfloat64[7] e\nfloat64[7] f",
     "Elbow": "\n".join(f"float64[2] {name}" for name in ["position", "desired", "commanded", "velocity", "acceleration"]),
-    "Errors": "\n".join(f"bool error_{at}" for at in range(ERRORS)),
+    "Errors": "\n".join(f"bool error_{at}" for at in range(37)),
     "FrankaRobotState": """std_msgs/Header header
 franka_msgs/CollisionIndicators collision_indicators
 sensor_msgs/JointState measured_joint_state

@@ -229,7 +229,7 @@ def test_transforms_of_unlike_rates_give_the_mesh_of_the_recording_that_has_them
 
 
 def test_one_topic_of_a_franka_gives_pose_and_wrench(demo_folder, tmp_path, touchup, touchup_bin, domain):
-    """Its state has some 3 kB, which come in fragments; the force is in the axes of the base, as the pose."""
+    """Its state has more than 2 kB, which come in fragments; the force is in the axes of the base, as the pose."""
     store, random = get_typestore(Stores.ROS2_HUMBLE), np.random.default_rng(7)
     franka_state.register(store)
     types = {}

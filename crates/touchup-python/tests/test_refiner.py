@@ -113,7 +113,6 @@ def test_what_was_pushed_is_judged_as_a_recording_is():
     refiner.push_many(samples)
     finished, refined = refiner.finish(force=True), touchup.refine(plate(), samples.recording("object"), SCENE, force=True)
     assert np.array_equal(finished.mesh.vertices, refined.mesh.vertices)
-    # the pairing of a recording needs a pose on both sides
     assert finished.summary["findings"] == refined.summary["findings"]
     assert finished.summary["samples"] == len(samples) == finished.summary["accepted"] and finished.summary["refused"] == {}
 
