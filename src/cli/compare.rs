@@ -10,14 +10,14 @@ use nalgebra::{Isometry3, Point3};
 use tracing::warn;
 
 use self::alignment::{Alignment, aligned_by_features, aligned_by_icp, aligned_by_pairs, moved};
+use self::table::CompareReport;
 pub use self::table::comparison_json;
-use self::table::{CompareReport, diagonal};
 use super::pictures::{file_name, today, view_from, write_coloured, write_picture};
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, print_report, require};
 use crate::compare::{
     CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
-    colour_of, compare as compare_shapes,
+    UnlikeExtents, colour_of, compare as compare_shapes,
 };
 use crate::io::features_file::{FeatureRecord, read_features};
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
@@ -140,8 +140,10 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     let before = arguments.before.as_ref().map(|path| read_scan(path, arguments.mesh_unit)).transpose();
     let before = before?.map(|file| file.mesh);
     let regions = read_regions(&arguments.mesh, arguments.mesh_unit, &as_read)?;
-    if let Some(hint) = unit_hint([&as_read, &truth], [arguments.mesh_unit, arguments.truth_unit]) {
-        warn!("{hint}");
+    let units = [arguments.mesh_unit, arguments.truth_unit];
+    let unlike = UnlikeExtents::of(&as_read, &truth);
+    if let Some(advice) = unlike.and_then(|unlike| advice_on(unlike, units, arguments.align)) {
+        warn!("{advice}");
     }
     let truth = PlacedMesh::new(truth);
     drop(reading);
@@ -321,15 +323,16 @@ fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Ve
     Ok((regions.len() == mesh.vertex_slots()).then_some(regions))
 }
 
-/// A hint where one shape is so much larger than the other that a unit is probably wrong.
-fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2]) -> Option<String> {
-    /// A scan may show a part of the part.
-    const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
+/// What to do where two shapes hardly show one part in one frame.
+fn advice_on(unlike: UnlikeExtents, [mesh_unit, truth_unit]: [MeshUnit; 2], align: Align) -> Option<String> {
     const ALIKE: std::ops::Range<f64> = 0.6..1.7;
-    let ratio = diagonal(mesh).norm() / diagonal(truth).norm();
-    if PLAUSIBLE.contains(&ratio) {
-        return None;
-    }
+    let ratio = match unlike {
+        UnlikeExtents::Size(ratio) => ratio,
+        UnlikeExtents::Apart(_) if align == Align::None => {
+            return Some(format!("{unlike}: are both in one frame? --align features brings them together"));
+        }
+        UnlikeExtents::Apart(_) => return None,
+    };
     let units = [MeshUnit::Millimetre, MeshUnit::Inch, MeshUnit::Metre];
     let of_mesh = units.iter().filter(|u| ALIKE.contains(&(ratio * u.metres() / mesh_unit.metres())));
     let of_truth = units.iter().filter(|u| ALIKE.contains(&(ratio / u.metres() * truth_unit.metres())));
@@ -337,8 +340,7 @@ fn unit_hint([mesh, truth]: [&TriMesh; 2], [mesh_unit, truth_unit]: [MeshUnit; 2
         .map(|unit| format!("--mesh-unit {unit}"))
         .chain(of_truth.map(|unit| format!("--truth-unit {unit}")))
         .collect();
-    let (factor, comparative) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
     let advice =
         if flags.is_empty() { "are these the same part?".to_owned() } else { format!("try {}", flags.join(" or ")) };
-    Some(format!("the mesh is {factor:.1} times {comparative} than the truth: {advice}"))
+    Some(format!("{unlike}: {advice}"))
 }

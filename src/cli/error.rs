@@ -204,7 +204,7 @@ errors_of_rooms! {
     OutcomeError => |error| match error {
         OutcomeError::WriteMesh(_) => NOT_WRITTEN,
         OutcomeError::ReadMesh(_) | OutcomeError::Mesh(_) => ("mesh", 3),
-        OutcomeError::Unchanged => ("input", 3),
+        OutcomeError::Unchanged | OutcomeError::Contradictory(_) => ("input", 3),
         OutcomeError::Table(_) => NOT_WRITTEN,
     }, "";
     SimError => |error| match error {

@@ -372,6 +372,7 @@ impl RefineArguments {
             None => places.write_moved(as_scanned, &ended.mesh())?,
         };
         drop(stage);
+        replayed.losses.extend(outcome.loss());
         let counts = ended.refiner.counts();
         debug!(?counts, "replayed");
         pushes.refused.extend(std::mem::take(&mut replayed.refused));

@@ -54,6 +54,11 @@ pub struct ResultTable {
 }
 
 impl ResultTable {
+    /// No rows yet, and columns that are there whether or not a row has a value for them.
+    pub fn with_columns(names: &[&str]) -> Self {
+        Self { columns: names.iter().map(|name| ((*name).to_owned(), Vec::new())).collect(), rows: 0 }
+    }
+
     /// A row for each feature; what is nested has its name behind that of what it is in, with `.` between, coordinates `_x`, `_y`, `_z`.
     pub fn of_features(features: &[FeatureRecord]) -> Self {
         let mut table = Self::default();
@@ -248,5 +253,14 @@ mod tests {
         assert_eq!(table.csv(), expected);
         let parquet = table.parquet().unwrap();
         assert!(parquet.starts_with(b"PAR1") && parquet.ends_with(b"PAR1"));
+    }
+
+    #[test]
+    fn a_column_that_is_named_is_there_without_a_value() {
+        let mut table = ResultTable::with_columns(&["job", "failed"]);
+        table.add_json(&[("job".to_owned(), Value::from(7)), ("failed".to_owned(), Value::Null)]);
+        assert_eq!(table.csv(), "job,failed\n7,\n");
+        assert_eq!(table.json_rows(), [serde_json::json!({ "job": 7 })]);
+        assert!(table.parquet().unwrap().ends_with(b"PAR1"));
     }
 }

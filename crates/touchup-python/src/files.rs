@@ -34,7 +34,7 @@ pub fn unit_of(name: &str) -> Result<MeshUnit, CliError> {
 /// For a name that there is not.
 pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
     let recorded: RecordedAs = serde_json::from_str(json).map_err(|error| usage(error.to_string()))?;
-    let stamps = recorded.stamps().map_err(usage)?;
+    let stamps = recorded.checked_stamps().map_err(usage)?;
     Ok((recorded, stamps))
 }
 

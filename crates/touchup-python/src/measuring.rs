@@ -11,7 +11,8 @@ use touchup_core::align::{
     fit_pairs, icp,
 };
 use touchup_core::compare::{
-    CompareParams, IndexedMesh, Regions, SupportRegion, compare as compare_shapes, sample_surface, surface_area,
+    CompareParams, IndexedMesh, Regions, SupportRegion, UnlikeExtents, compare as compare_shapes, sample_surface,
+    surface_area,
 };
 use touchup_core::features::detect;
 use touchup_core::mesh::{FaceTree, TriMesh};
@@ -86,6 +87,7 @@ pub fn compare<'py>(
     };
     let (mesh, truth, support) = read().map_err(|error| exception(py, error))?;
     let (report, deviations) = at_work(py, || {
+        UnlikeExtents::of(&mesh, &truth).into_iter().for_each(remark);
         let (mesh, truth) = (Indexed::new(mesh), Indexed::new(truth));
         let region = |number: &u8| match number {
             0 => SupportRegion::Untouched,
@@ -103,6 +105,13 @@ pub fn compare<'py>(
     into.set_item("report", report)?;
     into.set_item("deviation", PyArray1::from_vec(py, deviations))?;
     Ok(into)
+}
+
+fn remark(unlike: UnlikeExtents) {
+    match unlike {
+        UnlikeExtents::Size(_) => tracing::warn!("{unlike}: are both in m, and of the same part?"),
+        UnlikeExtents::Apart(_) => tracing::warn!("{unlike}: are both in one frame? touchup.align finds the motion"),
+    }
 }
 
 fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
@@ -124,6 +133,8 @@ pub fn align<'py>(
     let read = || Ok((mesh_of(&source, "the source")?, mesh_of(&target, "the target")?));
     let (source, target) = read().map_err(|error| exception(py, error))?;
     let (motion, report) = at_work(py, || {
+        let unlike = UnlikeExtents::of(&source, &target).filter(|unlike| matches!(unlike, UnlikeExtents::Size(_)));
+        unlike.into_iter().for_each(remark);
         let target = Indexed::new(target);
         match method {
             "icp" => {

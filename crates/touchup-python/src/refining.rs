@@ -13,14 +13,14 @@ use touchup_session::refinement::{
     FinishedRefinement, InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource, refine as refine_scan,
 };
 use touchup_session::replay::{Recording, marker_filter};
-use touchup_session::scan::read_scan;
+use touchup_session::scan::{read_scan, warn_of_left_out};
 use touchup_session::scene::Scene;
 use touchup_session::session::RefinedMesh;
 
 use crate::arrays::{
     Compact, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages, touches_array, wrench_frame,
 };
-use crate::failure::{at_work, exception, usage, warn};
+use crate::failure::{at_work, exception, usage};
 use crate::files::{recorded_as, set_columns, unit_of};
 use crate::scenes::{SceneSource, shown, source};
 
@@ -50,7 +50,9 @@ impl ScanSource {
         match self {
             Self::File(path, unit) => Ok(read_scan(&path, unit)?.mesh),
             Self::Arrays((vertices, faces)) => {
-                let MeshFile { mesh, .. } = repaired(&shown(None, "scan"), MeshUnit::Metre, vertices, faces)?;
+                let name = shown(None, "the scan");
+                let MeshFile { mesh, repair } = repaired(&name, MeshUnit::Metre, vertices, faces)?;
+                warn_of_left_out(&name, &repair);
                 Ok(mesh)
             }
         }
@@ -129,7 +131,7 @@ enum Touching {
     Messages { all: Vec<Message>, frame: WrenchFrame },
 }
 
-/// Refines, and judges the recording as `touchup refine` does; returns what came of it and what was lost.
+/// Refines, and judges the recording as `touchup refine` does.
 ///
 /// - `touching`: opens what was recorded, once scene and scan were read.
 fn refined(
@@ -137,7 +139,7 @@ fn refined(
     scene: &SceneSource,
     touching: impl FnOnce(&Scene) -> Result<Touching, CliError>,
     force: bool,
-) -> Result<(Reported, Vec<String>), CliError> {
+) -> Result<Reported, CliError> {
     let scan_name = if let ScanSource::File(path, _) = &scan { path.clone() } else { shown(None, "the scan") };
     let input = input_of(scan, scene)?;
     let (touches, recording_name) = match touching(&input.scene)? {
@@ -150,9 +152,7 @@ fn refined(
         }
     };
     let names = InputNames { scan: &scan_name, recording: &recording_name };
-    let mut refined = refine_scan(input, touches, names, force, &mut || {})?;
-    let losses = std::mem::take(&mut refined.replayed.losses);
-    Ok((warned(refined), losses))
+    Ok(warned(refine_scan(input, touches, names, force, &mut || {})?))
 }
 
 /// Judges and reconstructs what was pushed.
@@ -164,9 +164,10 @@ pub fn finish_refinement(refinement: JudgedRefinement, force: bool) -> Result<Re
     Ok(warned(refinement.finish(InputNames { scan: &scan, recording: &recording }, force)?))
 }
 
-/// Says what is doubtful.
+/// Says what is doubtful, and what was lost.
 fn warned(refined: RefinedScan) -> Reported {
     refined.findings.iter().for_each(|finding| tracing::warn!("{finding}"));
+    refined.replayed.losses.iter().for_each(|loss| tracing::warn!("{loss}"));
     refined.into()
 }
 
@@ -196,7 +197,7 @@ pub fn refine<'py>(
         Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, all))
     };
     let (scan, scene, all) = read().map_err(|error| exception(py, error))?;
-    let (reported, losses) = at_work(py, || {
+    let reported = at_work(py, || {
         let touching = |scene: &Scene| match (all, recording_file) {
             (Some((all, frame)), None) => Ok(Touching::Messages { all, frame }),
             (None, Some((path, recorded))) => {
@@ -208,6 +209,5 @@ pub fn refine<'py>(
         };
         refined(scan, &scene, touching, force)
     })?;
-    warn(py, &losses)?;
     reported.into_dict(py)
 }

@@ -1,5 +1,7 @@
 """Features, comparison and alignment, against closed forms and trimesh."""
 
+import contextlib
+
 import numpy as np
 import pytest
 import touchup
@@ -44,6 +46,18 @@ def test_a_plate_above_another_deviates_by_its_height():
     assert np.allclose(compared.deviation, 0.1e-3, atol=1e-12)
     assert compared.region()["mesh_to_truth"]["bias_mm"] == pytest.approx(0.1, abs=1e-9)
     assert [region["region"] for region in compared.report["regions"]] == ["all"]
+
+
+def test_a_unit_and_a_frame_that_are_probably_wrong_are_warned_of(ring):
+    large, small = touchup.Mesh.of(ring, "m"), touchup.Mesh.of(ring, "mm")
+    for of in (touchup.compare, touchup.align):
+        # which may then have no result
+        with pytest.warns(touchup.TouchupWarning, match="the mesh is 1000.0 times smaller than the truth: are both in m"), contextlib.suppress(touchup.TouchupError):
+            of(small, large)
+    beside = touchup.Mesh(small.vertices + [0.1, 0, 0], small.faces)
+    # 22 mm wide
+    with pytest.warns(touchup.TouchupWarning, match="the mesh lies 78.0 mm beside the truth: are both in one frame"):
+        touchup.compare(beside, small, samples=100)
 
 
 def test_deviations_are_the_distances_of_trimesh(ring, refined):

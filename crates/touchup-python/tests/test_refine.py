@@ -79,6 +79,33 @@ def test_what_is_doubtful_is_warned_of():
     assert doubtful.summary["findings"]
 
 
+def lifted(of_strokes):
+    """A plane that is touched in strokes, each so manieth of them on a part that was pushed up by 0.1 mm in between."""
+    samples = slide(0.2e-3, count=8000)
+    is_lifted = np.arange(8000) // 400 % of_strokes == 1
+    return touchup.Samples(samples.stamp_ns, samples.position + 0.1e-3 * is_lifted[:, None] * [0, 0, 1], samples.force)
+
+
+def test_contacts_that_contradict_each_other_are_warned_of_and_refused_where_they_are_many():
+    with pytest.warns(touchup.TouchupWarning, match=r"2\d % of the contacts contradicted others"):
+        summary = touchup.refine(plate(), lifted(4), SCENE).summary["uncertainty"]
+    # of 8000, one stroke of four
+    assert 1600 <= summary["rejected"] <= 2400
+    with pytest.raises(touchup.TouchupError, match="50 % of the contacts contradicted others") as refused:
+        touchup.refine(plate(), lifted(2), SCENE)
+    assert (refused.value.kind, refused.value.exit_code) == ("input", 3)
+    with pytest.warns(touchup.TouchupWarning, match="50 % of the contacts contradicted others"):
+        touchup.refine(plate(), lifted(2), SCENE, force=True)
+
+
+def test_faces_that_are_left_out_are_warned_of():
+    vertices, faces = plate()
+    vertices[0] = np.nan
+    # the corner at which the square is not cut
+    with pytest.warns(touchup.TouchupWarning, match="the coordinates of a corner are no place: 1$"):
+        touchup.refine((vertices, faces), slide(0.2e-3), SCENE)
+
+
 def test_arrays_that_hold_no_numbers_are_refused():
     samples = slide(0.2e-3, count=10)
     hidden = np.ma.array(samples.position, mask=np.zeros((10, 3), bool))

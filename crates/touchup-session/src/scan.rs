@@ -48,6 +48,7 @@ pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     let cloud = match read_mesh_or_points(path, unit)? {
         MeshOrPoints::Mesh(file) => {
             let MeshFile { mesh, repair } = *file;
+            warn_of_left_out(path, &repair);
             return Ok(Scan { mesh, repair, cloud: None });
         }
         MeshOrPoints::Points(cloud) => cloud,
@@ -57,6 +58,14 @@ pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
     let MeshFile { mesh, repair } = repaired(path, unit, positions, faces)?;
     tracing::warn!("{}: {summary}", path.display());
     Ok(Scan { mesh, repair, cloud: Some(summary) })
+}
+
+/// Says of how many faces a corner was no place.
+pub fn warn_of_left_out(path: &Path, repair: &RepairReport) {
+    if repair.dropped_not_finite > 0 {
+        let faces = repair.dropped_not_finite;
+        tracing::warn!("{}: faces left out because the coordinates of a corner are no place: {faces}", path.display());
+    }
 }
 
 /// Colours and texture of a scan on the mesh that was refined of it; nothing where the file has none.

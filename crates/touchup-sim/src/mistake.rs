@@ -44,6 +44,7 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("wrench turned 90° about x", InputCause::WrenchFrame, |x| x.forces(|f| Vector3::new(f.x, -f.z, f.y))),
     mistake("wrench turned 90° about y", InputCause::WrenchFrame, |x| x.forces(|f| Vector3::new(f.z, f.y, -f.x))),
     mistake("wrench's axes in another order", InputCause::WrenchFrame, |x| x.forces(|f| Vector3::new(f.y, f.z, f.x))),
+    mistake("wrench's x and y reversed", InputCause::WrenchFrame, |x| x.forces(|f| Vector3::new(-f.x, -f.y, f.z))),
     mistake("quaternion w first", InputCause::QuaternionOrder, |x| x.poses(read_w_first)),
     mistake("tare 2 N", InputCause::Tare, |x| x.forces(|f| f + Vector3::new(1.2, 0.0, -1.6))),
     mistake("tare 5 N", InputCause::Tare, |x| x.forces(|f| f + Vector3::new(0.0, 4.0, 3.0))),
@@ -64,6 +65,7 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("scan in inch as mm", InputCause::LengthUnit, |x| x.scan(|p| p / 25.4)),
     mistake("poses in mm", InputCause::LengthUnit, |x| x.positions(|p| p * 1e3)),
     mistake("tip in m", InputCause::Radius, |x| x.tip(|tip| tip.radius *= 1e-3)),
+    mistake("radius times 2.5", InputCause::Radius, |x| x.tip(|tip| tip.radius *= 2.5)),
     mistake("radius times 4", InputCause::Radius, |x| x.tip(|tip| tip.radius *= 4.0)),
     mistake("stiffness a thousandth", InputCause::Stiffness, |x| {
         x.tip(|tip| tip.stiffness = tip.stiffness.map(|k| k / 1e3))

@@ -9,6 +9,7 @@ mod comparison;
 mod deviation;
 mod disagreement;
 mod displacement;
+mod extents;
 mod lines;
 mod normals;
 mod picture;
@@ -25,6 +26,7 @@ pub use disagreement::{
     VertexBasis, disagreement,
 };
 pub use displacement::{DisplacedFrom, Displacement, displacements_by_vertex, displacements_to_surface, moved_count};
+pub use extents::UnlikeExtents;
 pub use lines::DrawnMesh;
 pub use normals::{Tilt, TiltSummary, angle_between, tilts};
 pub use picture::{PartView, Picture, PictureLabel, PicturePanel, PictureParams, draw_part, draw_picture};

@@ -15,6 +15,8 @@ names! {
         ZeroStamps = "zero_stamps",
         /// Poses and wrenches are stamped by clocks that have nothing in common.
         TwoEpochs = "two_epochs",
+        /// Stamps in another unit of time.
+        TimeUnit = "time_unit",
         /// Stamps of one stream that go back.
         StampsGoBack = "stamps_go_back",
         /// Poses too far apart in time to interpolate between them.
@@ -66,6 +68,7 @@ impl InputCause {
             | Self::QuaternionOrder => true,
             Self::ZeroStamps
             | Self::TwoEpochs
+            | Self::TimeUnit
             | Self::StampsGoBack
             | Self::SlowPoses
             | Self::Delay

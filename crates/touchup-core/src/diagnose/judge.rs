@@ -2,15 +2,16 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::axes::{OtherAxes, WRENCH_FRAME_REMEDY};
 use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, NOISES, axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
 use super::mends::PlaceMend;
 use super::monitor_params::InputMonitorParams;
-use super::places::{ALIKE, BallFit, ScanScale, extent_of};
+use super::places::{ALIKE, BallFit, LEAST_TOLERANCE, ScanScale, error_of_median, extent_of};
 use super::shift::{ContactShift, best_shift};
 use crate::mesh::{FaceTree, TriMesh};
-use crate::numeric::{NormalEquations, jackknife_variance};
+use crate::numeric::{NormalEquations, SIGMA_OF_MEDIAN, jackknife_variance, median};
 use crate::stylus::{ClockDrift, ClockOffset, TipParams, TipShape, WrenchFrame};
 
 /// Fewer presses say nothing.
@@ -72,6 +73,13 @@ const STRETCHES: usize = 16;
 const OTHER_COMPLIANCE: f64 = 0.4;
 /// … and the ball sinks by so much less or more, m.
 const LEAST_SUNK: f64 = 0.15e-3;
+/// A force presses straight when the cosine to the scan's normal is larger.
+const STRAIGHT: f64 = 0.8;
+/// The ball is another one when its centre is so many deviations of the scan from where it should be, and surely with so many.
+const DOUBTED_NOISES: f64 = 0.75;
+const SURE_NOISES: f64 = 1.25;
+/// … beyond this share of what the stylus bends by: so far its stiffness may be off.
+const OTHER_SINK: f64 = 0.2;
 /// No scanner is worse, m.
 const LARGEST_SCAN_NOISE: f64 = 2e-3;
 
@@ -130,19 +138,23 @@ impl InputJudge<'_> {
         let mut findings = Vec::new();
         self.judge_forces(&presses, is_free.then_some(resting.len()), &mut findings);
         let place = self.judge_places(&presses);
+        let is_doubted_place = place.is_some();
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
         findings.extend(place.map(|(finding, _)| finding));
         let is_of_poses = |finding: &InputFinding| {
             matches!(finding.cause, InputCause::LengthUnit | InputCause::PositionAxes | InputCause::QuaternionOrder)
         };
-        let wrench = is_placed.then(|| self.judge_wrench(&presses)).flatten();
+        let wrench = || self.judge_wrench(&presses).or_else(|| self.judge_axes(&presses));
+        let wrench = is_placed.then(wrench).flatten();
         // what turns the force turns its course too
         if wrench.is_none() && !findings.iter().any(is_of_poses) {
             findings.extend(self.judge_clock());
         }
-        if wrench.is_none() && findings.is_empty() {
-            findings.extend(self.judge_stiffness(&presses));
-        }
+        let stiffness = (wrench.is_none() && findings.is_empty()).then(|| self.judge_stiffness(&presses)).flatten();
+        // as far off as a place or a stiffness that is wrong has it
+        let is_explained = wrench.is_some() || stiffness.is_some() || is_doubted_place;
+        let radius = (!is_explained).then(|| self.judge_radius(&presses)).flatten();
+        findings.extend(stiffness.or(radius));
         findings.extend(wrench);
         findings
     }
@@ -207,8 +219,8 @@ impl InputJudge<'_> {
         let is_ball = self.params.shape == TipShape::Ball;
         // by how much the median distance is uncertain: presses that follow each other are alike
         let noise = scale.noise.max(self.params.scan_noise).min(LARGEST_SCAN_NOISE);
-        let error = reported.error(records.len());
-        let off_by_radius = || (off_by_radius(&reported, radius, error), true);
+        let error = error_of_median(reported.scatter, records.len());
+        let off_by_radius = || (off_by_radius(reported.distance, error, radius), true);
         let is_on_scan = reported.share >= SHARE_ON_SCAN && (reported.distance - radius).abs() <= tolerance + sunk;
         if is_on_scan && is_ball {
             // a scan's own offset is within the tolerance; a radius in another unit is not a matter of tolerance
@@ -356,9 +368,7 @@ impl InputJudge<'_> {
         };
         let is_sure = turned > LEANS && turned > as_read + 0.3;
         let measured = format!("{before}, and {:.0}° {says}", degrees(turned));
-        let remedy =
-            "the frame_id of the wrench names its axes: that of the pose the scan's, any other the stylus' own";
-        Some(InputFinding::new(InputCause::WrenchFrame, is_sure, measured, remedy))
+        Some(InputFinding::new(InputCause::WrenchFrame, is_sure, measured, WRENCH_FRAME_REMEDY))
     }
 
     /// How far the reported centre sinks with the force: the slope of its distance from the scan over |F|, by least squares, with the
@@ -402,6 +412,52 @@ impl InputJudge<'_> {
         is_doubted.then(|| InputFinding::new(InputCause::Stiffness, is_sure, measured, remedy))
     }
 
+    /// Whether other axes explain the forces better, where they lean from the scan no more than others do.
+    fn judge_axes(&self, presses: &Presses) -> Option<InputFinding> {
+        let Presses { levels, tolerance, .. } = presses;
+        let turn_wo = self.params.placement.pose_wo.map(|pose_wo| pose_wo.rotation).unwrap_or_default();
+        let axes = |record: &InputRecord| match self.params.compensator.wrench_frame {
+            WrenchFrame::Sensor => record.rotation.inverse(),
+            WrenchFrame::Object => turn_wo,
+        };
+        let normals = |slides: &[&InputRecord]| self.fit(slides, *tolerance).normals;
+        OtherAxes::of(self.records, levels, normals, axes)?.finding()
+    }
+
+    /// Whether the ball is as far from the scan as its radius where it presses straight on it; what leans is at edges and in holes, of
+    /// which the scan knows little.
+    fn judge_radius(&self, presses: &Presses) -> Option<InputFinding> {
+        let Presses { records, levels, scale, tolerance, sunk } = presses;
+        let TipParams { radius, stiffness } = self.params.tip;
+        if self.params.shape != TipShape::Ball {
+            return None;
+        }
+        let compliance = stiffness.map_or(0.0, f64::recip);
+        let fit = self.fit(records, tolerance + sunk);
+        let mut distances: Vec<f64> = records
+            .iter()
+            .zip(&fit.distances)
+            .zip(&fit.normals)
+            .filter_map(|((record, distance), normal)| {
+                let force = record.rotation * (record.force_t() - levels.rest_t);
+                let is_straight = force.dot(normal) > STRAIGHT * force.norm() && *distance > -tolerance;
+                is_straight.then(|| distance + compliance * force.norm())
+            })
+            .collect();
+        let count = distances.len();
+        let distance = median(&mut distances).filter(|_| count >= FEWEST_PRESSES)?;
+        distances.iter_mut().for_each(|x| *x = (*x - distance).abs());
+        let scatter = median(&mut distances)?;
+        let error = error_of_median(scatter, count);
+        // what differs slowly over the scan is seen between the contacts alone
+        let noise = scale.noise.max(self.params.scan_noise).max(SIGMA_OF_MEDIAN * scatter).min(LARGEST_SCAN_NOISE);
+        // the nearest of what is rough is above its mean
+        let off = (distance + 0.5 * noise - radius).abs() - OTHER_SINK * compliance * levels.largest;
+        let is_doubted = off - 3.0 * error > (DOUBTED_NOISES * noise).max(LEAST_TOLERANCE);
+        let is_sure = off - 4.0 * error > (SURE_NOISES * noise).max(2.0 * LEAST_TOLERANCE);
+        is_doubted.then(|| InputFinding { is_sure, ..off_by_radius(distance, error, radius) })
+    }
+
     fn judge_clock(&self) -> Option<InputFinding> {
         let ClockOffset { offset, sigma, drift, evidence } = self.clock?;
         let largest = drift.map_or(offset.abs(), |of| of.offset_at_first.abs().max(of.offset_at_last.abs()));
@@ -432,10 +488,11 @@ impl InputJudge<'_> {
 const FRAME_REMEDY: &str = "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
 const W_LAST: &str = "give the orientation as x, y, z, w";
 
-fn off_by_radius(fit: &BallFit, radius: f64, error: f64) -> InputFinding {
+/// - `distance`: of the ball's centre from the scan, m; `error`: its standard uncertainty.
+fn off_by_radius(distance: f64, error: f64, radius: f64) -> InputFinding {
     let measured = format!(
         "the ball's centre is {:.2} ± {:.2} mm off the scan where it presses, and its radius is said to be {:.4} mm",
-        fit.distance * 1e3,
+        distance * 1e3,
         error * 1e3,
         radius * 1e3
     );

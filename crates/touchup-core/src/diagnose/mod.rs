@@ -4,6 +4,7 @@
 //! [`InputFinding`]s at any time. A rigid ball that touches has its centre one radius off the surface and a force along the outward
 //! normal of it; free, it has no force. What breaks one of these is compared with what would mend it.
 
+mod axes;
 mod finding;
 mod forces;
 mod input_record;

@@ -62,6 +62,12 @@ impl InputMonitor {
         self.stamps.push(message);
     }
 
+    /// Takes the stamp of a sample that came as one message: its pose and its wrench have it.
+    #[inline]
+    pub fn paired_message(&mut self, stamp_ns: i64) {
+        self.stamps.push_pair(stamp_ns);
+    }
+
     /// Takes a sample that was made of the messages.
     pub fn sample(&mut self, sample: &Sample) {
         let force = sample.wrench.force;

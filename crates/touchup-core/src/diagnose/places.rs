@@ -8,7 +8,7 @@ use crate::numeric::{SIGMA_OF_MEDIAN, median};
 /// A noisy scan is this much off at most, m: a wider tolerance would hide a wrong unit.
 const LARGEST_TOLERANCE: f64 = 6e-3;
 /// … and no pose is better than this, m.
-const LEAST_TOLERANCE: f64 = 0.3e-3;
+pub(super) const LEAST_TOLERANCE: f64 = 0.3e-3;
 /// Vertices that the noise is estimated from.
 const NOISE_VERTICES: usize = 4000;
 
@@ -97,12 +97,14 @@ pub(super) const ALIKE: f64 = 10.0;
 const MOST_UNDER_LIDS: f64 = 0.6;
 const MOST_BEYOND_RIMS: f64 = 0.8;
 
-impl BallFit {
-    /// Standard uncertainty of the median distance of `count` centres, m.
-    pub fn error(&self, count: usize) -> f64 {
-        1.25 * SIGMA_OF_MEDIAN * self.scatter / (count as f64 / ALIKE).max(1.0).sqrt()
-    }
+/// Standard uncertainty of the median of `count` distances, m.
+///
+/// - `scatter`: their median deviation from it, m.
+pub(super) fn error_of_median(scatter: f64, count: usize) -> f64 {
+    1.25 * SIGMA_OF_MEDIAN * scatter / (count as f64 / ALIKE).max(1.0).sqrt()
+}
 
+impl BallFit {
     pub fn of(
         scan: &TriMesh,
         tree: &FaceTree,

@@ -8,6 +8,8 @@ use crate::stylus::Message;
 const MOST_PERIODS: usize = 2048;
 /// A stamp that goes back by more was not swapped on the way, ns.
 const GOES_BACK_NS: i64 = 1_000_000_000;
+/// No force is measured in a shorter time, s.
+const FASTEST: f64 = 5e-6;
 /// Fewer messages say nothing.
 const FEWEST: u64 = 20;
 
@@ -48,6 +50,13 @@ pub(super) struct InputStamps {
 }
 
 impl InputStamps {
+    /// A sample whose pose and wrench have one stamp.
+    #[inline]
+    pub fn push_pair(&mut self, stamp_ns: i64) {
+        self.poses.push(stamp_ns);
+        self.wrenches.push(stamp_ns);
+    }
+
     pub fn push(&mut self, message: &Message) {
         let stream = if matches!(message, Message::Pose(_)) { &mut self.poses } else { &mut self.wrenches };
         stream.push(message.stamp_ns());
@@ -83,6 +92,16 @@ impl InputStamps {
             }
         }
         if !findings.is_empty() {
+            return findings;
+        }
+        let wrench_period = median(&mut self.wrenches.periods.clone()).unwrap_or(0.0);
+        if self.wrenches.count >= FEWEST && (0.0..FASTEST).contains(&wrench_period) {
+            findings.push(InputFinding::new(
+                InputCause::TimeUnit,
+                true,
+                format!("the wrenches come every {:.3} µs", wrench_period * 1e6),
+                "no cell is so fast: the stamps look like µs or ms, and are read as ns",
+            ));
             return findings;
         }
         if let (Some(poses), Some(wrenches)) = (self.poses.span_ns, self.wrenches.span_ns) {

@@ -181,9 +181,8 @@ impl Header<'_> {
             return Ok(Some(columns));
         }
         for group in usual.groups {
-            let at =
-                |name: &&str| self.0.iter().position(|there| split_unit(there, quantity).0.eq_ignore_ascii_case(name));
-            let Some(places) = group.iter().map(at).collect::<Option<Vec<_>>>() else { continue };
+            let at = |name: &&str| self.only(key, |there| split_unit(there, quantity).0.eq_ignore_ascii_case(name));
+            let Some(places) = group.iter().map(at).collect::<Result<Option<Vec<_>>, _>>()? else { continue };
             let mut columns = [Column { at: 0, factor: 1.0 }; N];
             for (column, at) in columns.iter_mut().zip(places) {
                 let factor =
@@ -208,12 +207,25 @@ impl Header<'_> {
         Some(columns)
     }
 
+    /// The place of the only column that is meant; `None` where there is none.
+    fn only(&self, key: &str, is_meant: impl Fn(&String) -> bool) -> Result<Option<usize>, String> {
+        let mut meant = (0..self.0.len()).filter(|&at| is_meant(&self.0[at]));
+        match (meant.next(), meant.next()) {
+            (Some(one), Some(other)) => Err(format!(
+                "columns {:?} and {:?} could both be meant by the {key}: take one out, or name the right one by `columns: {{ {key}: … }}` \
+                 in the scene",
+                self.0[one], self.0[other]
+            )),
+            (at, _) => Ok(at),
+        }
+    }
+
     /// A column by the name that the scene gives it, which may have the unit that the header lacks.
     fn named(&self, key: &str, name: &str, quantity: Quantity) -> Result<Column, String> {
         let (plain, told) = split_unit(name, quantity);
-        let is_meant = |there: &&String| *there == name || split_unit(there, quantity).0 == plain;
-        let exact = self.0.iter().position(|there| there == name);
-        let at = exact.or_else(|| self.0.iter().position(|there| is_meant(&there)));
+        let is_meant = |there: &String| split_unit(there, quantity).0 == plain;
+        let exact = self.only(key, |there| there == name)?;
+        let at = exact.map_or_else(|| self.only(key, is_meant), |at| Ok(Some(at)))?;
         let at = at.ok_or_else(|| {
             format!("no column {name:?}, which columns.{key} of the scene names. It has: {}", self.list())
         })?;

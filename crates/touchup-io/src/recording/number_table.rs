@@ -20,6 +20,9 @@ const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "log"];
 /// Longest line: hundreds of columns.
 const MAX_LINE_BYTES: u64 = 64 << 10;
 
+/// A table of which none of the first lines can be used is refused; what comes after that many is counted.
+const LOOKED_AT: usize = 16;
+
 /// The rows of a table, one after another.
 pub(super) struct NumberTable {
     lines: TableLines,
@@ -50,6 +53,11 @@ struct TableLines {
 }
 
 impl TableLines {
+    fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::open(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        Ok(Self { path: path.to_owned(), input: BufReader::new(file), line: Vec::new(), at: 0 })
+    }
+
     /// Reads the next line; `false` at the end.
     fn advance(&mut self) -> Result<bool, RecordingError> {
         loop {
@@ -81,8 +89,7 @@ impl NumberTable {
     /// # Errors
     /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the columns that are there, when they do not say what is what.
     pub fn open(path: &Path, columns: &TableColumns) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
-        let mut lines = TableLines { path: path.to_owned(), input: BufReader::new(file), line: Vec::new(), at: 0 };
+        let mut lines = TableLines::open(path)?;
         let bad = |what: &str| RecordingError::Columns { path: path.to_owned(), what: what.to_owned() };
         if !lines.advance()? {
             return Err(bad("the table is empty; its first line names the columns"));
@@ -95,7 +102,46 @@ impl NumberTable {
             return Err(bad("its first line has numbers alone; it must name the columns"));
         }
         let columns = columns.find(&names).map_err(|what| bad(&what))?;
-        Ok(Self { lines, separator, columns, width: names.len() })
+        let mut ahead =
+            Self { lines: TableLines::open(path)?, separator, columns: columns.clone(), width: names.len() };
+        match ahead.why_unusable()? {
+            Some(why) => Err(bad(&why)),
+            None => Ok(Self { lines, ..ahead }),
+        }
+    }
+
+    /// Why none of the first lines can be used, by the first of them; `None` where one can. Reads them.
+    fn why_unusable(&mut self) -> Result<Option<String>, RecordingError> {
+        self.lines.advance()?;
+        let mut why = None;
+        for _ in 0..LOOKED_AT {
+            match self.next_row()? {
+                None => break,
+                Some(Ok(_)) => return Ok(None),
+                Some(Err(bad)) => why = why.or_else(|| Some(self.in_words(bad))),
+            }
+        }
+        Ok(why)
+    }
+
+    /// What is wrong with the last line.
+    fn in_words(&self, bad: BadMessage) -> String {
+        let (line, width) = (self.lines.at, self.width);
+        let count = str::from_utf8(&self.lines.line).map_or(0, |text| split(text.trim(), self.separator).len());
+        match bad {
+            BadMessage::Quaternion => format!(
+                "the orientation in line {line} has not the length 1: a quaternion is x, y, z, w, a rotation vector has finite numbers"
+            ),
+            BadMessage::Stamp => format!("the time in line {line} is no number, or too large: decimals have a point"),
+            _ if count != width => {
+                format!(
+                    "line {line} has {count} values for {width} columns: decimals have a point, and each line has all columns"
+                )
+            }
+            _ => format!(
+                "line {line} has a value that is no number, or a vector of which a part is empty: decimals have a point"
+            ),
+        }
     }
 
     /// In whose axes the wrenches are.

@@ -44,10 +44,12 @@ enum Kind {
     Text,
 }
 
-/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text.
+/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text, and so is a column without a value.
 fn kind_of(column: &[Option<Cell>]) -> Kind {
     let is_all = |is: fn(&Cell) -> bool| column.iter().flatten().all(is);
-    if is_all(|cell| matches!(cell, Cell::Count(_))) {
+    if column.iter().all(Option::is_none) {
+        Kind::Text
+    } else if is_all(|cell| matches!(cell, Cell::Count(_))) {
         Kind::Count
     } else if is_all(|cell| matches!(cell, Cell::Count(_) | Cell::Number(_))) {
         Kind::Number

@@ -15,8 +15,7 @@ use touchup_core::haptic::{RefineCounts, RefineError, RefineParams, Refiner, Upd
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_core::stylus::{
-    ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, StampedPose, StampedWrench,
-    WrenchFrame,
+    ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
 };
 
 mod watch;
@@ -285,7 +284,7 @@ pub struct InputNames<'a> {
 pub struct RefinedScan {
     /// mesh and touches
     pub finished: FinishedRefinement,
-    /// counts and losses of the replay; what it refused is in `refused`
+    /// counts of the replay, and losses, also of the contacts; what it refused is in `refused`
     pub replayed: Replayed,
     /// samples that the update took
     pub accepted: u64,
@@ -321,6 +320,7 @@ impl JudgedSamples {
         }
         refused.append(&mut replayed.refused);
         let finished = refinement.finish(force)?;
+        replayed.losses.extend(finished.mesh.outcome.loss());
         let outside_region = finished.counts.outside_region;
         if outside_region > 0 {
             refused.insert("outside_region".to_owned(), outside_region);
@@ -359,9 +359,7 @@ impl JudgedRefinement {
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
         let update =
             self.refinement.engine.push(sample).inspect_err(|error| count_refusal(&mut self.refused, error))?;
-        let Sample { stamp_ns, pose_ot, wrench } = *sample;
-        self.watch.monitor.message(&Message::Pose(StampedPose { stamp_ns, pose_ot }));
-        self.watch.monitor.message(&Message::Wrench(StampedWrench { stamp_ns, wrench }));
+        self.watch.monitor.paired_message(sample.stamp_ns);
         self.watch.sample(sample, self.refinement.engine.refiner());
         self.accepted += 1;
         Ok(update)

@@ -54,7 +54,7 @@ impl RecordedAs {
     ///
     /// # Errors
     /// Where it is no word for one, and where what is named does not go together.
-    pub fn stamps(&self) -> Result<StampSource, String> {
+    pub fn checked_stamps(&self) -> Result<StampSource, String> {
         if self.base_frame.is_some() && self.pose_frame.is_none() {
             return Err("base_frame is the frame in which the pose of pose_frame is wanted: name pose_frame".to_owned());
         }
@@ -74,15 +74,15 @@ mod tests {
     fn names_that_do_not_go_together_are_refused() {
         let some = |name: &str| Some(name.to_owned());
         let usual = RecordedAs::default();
-        assert_eq!(usual.stamps(), Ok(StampSource::Header));
-        assert_eq!(RecordedAs { stamp: some("log"), ..usual.clone() }.stamps(), Ok(StampSource::Log));
+        assert_eq!(usual.checked_stamps(), Ok(StampSource::Header));
+        assert_eq!(RecordedAs { stamp: some("log"), ..usual.clone() }.checked_stamps(), Ok(StampSource::Log));
         for (recorded, word) in [
             (RecordedAs { stamp: some("Log"), ..usual.clone() }, "stamp is Log"),
             (RecordedAs { base_frame: some("base"), ..usual.clone() }, "name pose_frame"),
             (RecordedAs { markers_topic: some("/m"), pose_topic: some("/p"), ..usual.clone() }, "leave out pose_topic"),
             (RecordedAs { markers_topic: some("/m"), pose_frame: some("t"), ..usual.clone() }, "leave out pose_topic"),
         ] {
-            assert!(recorded.stamps().unwrap_err().contains(word), "{recorded:?}");
+            assert!(recorded.checked_stamps().unwrap_err().contains(word), "{recorded:?}");
         }
         let layout = RecordedAs { pose_frame: some("tool0"), ..usual }.layout(&Scene::default());
         assert_eq!((layout.topics.pose.as_str(), layout.topics.wrench.as_str()), ("/tf", "/stylus/wrench"));

@@ -41,6 +41,9 @@ pub enum OutcomeError {
     /// The result would be the scan, or the scan and something beside it.
     #[error("no face of the scan is moved or replaced: the touches are not on it")]
     Unchanged,
+    /// Many contacts contradict each other.
+    #[error("{0}")]
+    Contradictory(String),
 }
 
 /// Where a result goes.
@@ -58,7 +61,7 @@ pub struct OutcomePlaces<'a> {
     pub touches: Option<&'a Path>,
     /// the rest of a scan of which a part was refined
     pub outside: Option<&'a Outside>,
-    /// whether a result in which no face of the scan is moved or replaced is refused
+    /// whether a result in which no face of the scan is moved or replaced, or whose contacts contradict each other, is refused
     pub must_change: bool,
 }
 
@@ -207,8 +210,10 @@ impl RefinedMesh {
 
     /// The touched part of the scan remeshed; arguments as of [`Self::moved`].
     ///
+    /// - `must_change`: also whether one whose contacts contradict each other is refused.
+    ///
     /// # Errors
-    /// [`OutcomeError::Unchanged`], [`OutcomeError::Mesh`].
+    /// [`OutcomeError::Unchanged`], [`OutcomeError::Contradictory`], [`OutcomeError::Mesh`].
     pub fn patched(
         scan: &TriMesh,
         mut patcher: Patcher,
@@ -222,6 +227,9 @@ impl RefinedMesh {
         let build_s = started.elapsed().as_secs_f64();
         debug!(open_squares = patched.open_squares, "patched");
         let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
+        if let Some(known) = uncertainty.as_ref().filter(|known| must_change && known.is_contradictory()) {
+            return Err(OutcomeError::Contradictory(known.contradiction()));
+        }
         let moved_faces = moved_faces(scan, &patched.mesh);
         let of_scan = patcher.params().uncertainty.map_or(0.0, |known| known.scan);
         let own = origins(scan, &patched.mesh);
@@ -239,6 +247,13 @@ impl RefinedMesh {
         };
         let Patched { mesh, support, sigma, .. } = patched;
         Ok(Self { mesh, origins, support, sigma, columns, touches: patcher.probed().to_vec(), outcome })
+    }
+}
+
+impl Outcome {
+    /// What was lost of the contacts; `None` where hardly any was.
+    pub fn loss(&self) -> Option<String> {
+        self.uncertainty.as_ref()?.loss()
     }
 }
 

@@ -50,8 +50,37 @@ reported! {
 
 /// Number of listed outliers.
 const MOST_LISTED: usize = 8;
+/// Of a sound recording less than a thousandth of the contacts is rejected; what more of them is lost is worth a word, …
+const WORTH_A_WORD: f64 = 0.1;
+/// … and where so many contradict the others, nobody knows which of them are right.
+const MOST_REJECTED: f64 = 0.4;
 
 impl UncertaintySummary {
+    fn is_rejected(&self, share: f64) -> bool {
+        self.rejected as f64 > share * self.judged as f64
+    }
+
+    /// Whether the contacts contradict each other so much that the result is worth nothing.
+    pub fn is_contradictory(&self) -> bool {
+        self.is_rejected(MOST_REJECTED)
+    }
+
+    /// What was lost, where so many contacts were rejected that it is worth a word.
+    pub fn loss(&self) -> Option<String> {
+        self.is_rejected(WORTH_A_WORD).then(|| self.contradiction())
+    }
+
+    /// How many contacts were rejected, and what to do.
+    pub fn contradiction(&self) -> String {
+        let Self { rejected, judged, .. } = self;
+        let percent = 100.0 * *rejected as f64 / *judged as f64;
+        let [rejected, judged] = [*rejected, *judged].map(in_thousands);
+        format!(
+            "{percent:.0} % of the contacts contradicted others and did not count ({rejected} of {judged}): are the axes of the wrench, its \
+             clock and the radius right, and did the part stay in place?"
+        )
+    }
+
     /// Place and distance of the last outlier.
     pub fn last_outlier(&self) -> Option<String> {
         let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
@@ -82,7 +111,28 @@ impl fmt::Display for UncertaintySummary {
 
 #[cfg(test)]
 mod tests {
-    use super::in_thousands;
+    use super::{UncertaintySummary, in_thousands};
+
+    #[test]
+    fn many_rejected_contacts_are_a_loss_and_more_of_them_a_contradiction() {
+        let of = |rejected, judged| UncertaintySummary {
+            touched_sigma_mm: 0.01,
+            judged,
+            rejected,
+            relocated: 0,
+            outliers: Vec::new(),
+        };
+        for sound in [of(0, 0), of(40, 52_970), of(1, 10)] {
+            assert_eq!((sound.loss(), sound.is_contradictory()), (None, false));
+        }
+        let lost = of(3_000, 12_000);
+        assert!(
+            lost.loss()
+                .unwrap()
+                .starts_with("25 % of the contacts contradicted others and did not count (3,000 of 12,000)")
+        );
+        assert!(!lost.is_contradictory() && of(4_801, 12_000).is_contradictory());
+    }
 
     #[test]
     fn counts_are_grouped_by_three_digits_from_the_right() {

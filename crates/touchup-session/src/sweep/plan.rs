@@ -52,7 +52,7 @@ impl SweepPlan {
     pub fn read(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<Self, SweepError> {
         let mut grid = SweepGrid::read(grid, recordings)?;
         let refused = |why: String| SweepError::Grid { path: grid.path.clone(), why };
-        grid.recorded.stamps().map_err(refused)?;
+        grid.recorded.checked_stamps().map_err(refused)?;
         let (base, scene_scan, scene_hash) = match &grid.scene {
             None => (BaseScene::of("")?, None, None),
             Some(path) => {

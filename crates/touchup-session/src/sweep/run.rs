@@ -191,7 +191,9 @@ impl From<RefinementError> for JobFailure {
     fn from(error: RefinementError) -> Self {
         match error {
             RefinementError::Outcome(error) => match *error {
-                OutcomeError::Unchanged | OutcomeError::Mesh(_) => Self::OfInput(error.to_string()),
+                OutcomeError::Unchanged | OutcomeError::Contradictory(_) | OutcomeError::Mesh(_) => {
+                    Self::OfInput(error.to_string())
+                }
                 error => Self::OfSystem(error.into()),
             },
             error => Self::OfInput(error.to_string()),
@@ -211,7 +213,7 @@ fn refined(
     let of_input = |error: &dyn std::fmt::Display| JobFailure::OfInput(error.to_string());
     let mesh = read_scan(scan, job.mesh_unit).map_err(|error| of_input(&error))?.mesh;
     let markers = marker_filter(&scene, job.recorded.markers_topic.as_deref()).map_err(|error| of_input(&error))?;
-    let stamps = job.recorded.stamps().map_err(JobFailure::OfInput)?;
+    let stamps = job.recorded.checked_stamps().map_err(JobFailure::OfInput)?;
     let opened = Recording::open(recording, job.recorded.layout(&scene), stamps).map_err(|error| of_input(&error))?;
     let input = RefinementInput::new(scene, mesh).map_err(|error| of_input(&error))?;
     let touches = TouchSource::Recorded { recording: Box::new(opened), markers: markers.map(Box::new) };

@@ -148,6 +148,9 @@ impl Sampling {
             KeyValues::Range { steps: None, .. } if self == Self::Grid => {
                 Err("a grid needs steps: { from: 1, to: 2, steps: 5 }".to_owned())
             }
+            KeyValues::Range { steps: Some(_), .. } if self != Self::Grid => {
+                Err("steps divide a range for a grid; here samples says how many there are: leave steps out".to_owned())
+            }
             KeyValues::Range { steps: Some(0), .. } => Err("steps must be at least 1".to_owned()),
             KeyValues::Range { from, to, steps: Some(1), .. } if from != to => {
                 Err("one step cannot be at both from and to: give steps: 2 or more".to_owned())
@@ -275,6 +278,8 @@ mod tests {
         assert!(of("{ from: 0, to: 1, scale: log }").unwrap_err().contains("above 0"));
         assert!(of("{ from: 0, till: 1 }").unwrap_err().contains("till"));
         assert!(Sampling::Grid.check(&of("{ from: 0, to: 1 }").unwrap()).unwrap_err().contains("steps"));
+        let with_steps = of("{ from: 0, to: 1, steps: 3 }").unwrap();
+        assert!(Sampling::Random { samples: 8, seed: 1 }.check(&with_steps).unwrap_err().contains("leave steps out"));
         assert!(Sampling::Sobol { samples: 65_537, seed: 1 }.check_count(&BTreeMap::new()).is_err());
         assert_eq!(of("7.0").unwrap(), KeyValues::Listed(vec![Value::from(7)]));
     }

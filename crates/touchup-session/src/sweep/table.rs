@@ -35,7 +35,9 @@ pub struct SweepTables {
 /// # Errors
 /// [`SweepError`]: a line of the plan or a file of a result that cannot be read.
 pub fn tables_of(jobs: &Path, results: &Path, with_features: bool) -> Result<SweepTables, SweepError> {
-    let mut tables = SweepTables::default();
+    // also where no job failed, or none is simulated
+    let jobs_table = ResultTable::with_columns(&["job", "id", "recording", "seed", "failed"]);
+    let mut tables = SweepTables { jobs: jobs_table, ..SweepTables::default() };
     for job in JobsFile::open(jobs)? {
         let job = job?;
         let result = results.join(&job.id);

@@ -80,6 +80,12 @@ fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
     assert!(text.contains("columns: { time: … }") && text.contains("It has: a, b"), "{text}");
     let text = why("t_s,x,y,z,fx_n,fy_n,fz_n\n", &usual);
     assert!(text.contains("\"x\" has no unit (m, mm, um or inch)") && text.contains("x [mm]"), "{text}");
+    for header in ["t_s,x_mm,y_mm,z_mm,x_m,fx_n,fy_n,fz_n\n", "t_s,x_m,y_m,z_m,x_m,fx_n,fy_n,fz_n\n"] {
+        let text = why(header, &usual);
+        assert!(text.contains("and \"x_m\" could both be meant by the position"), "{text}");
+    }
+    let wanted = TableColumns { position: names(&["x_mm", "y_mm", "z_mm"]), ..usual.clone() };
+    assert!(read("t_s,x_mm,y_mm,z_mm,x_m,fx_n,fy_n,fz_n\n", &wanted).is_ok());
     let wanted = TableColumns { force: names(&["u", "v", "w"]), ..usual.clone() };
     let text = why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted);
     assert!(text.contains("no column \"u\"") && text.contains("columns.force") && text.contains("fz_n"), "{text}");
@@ -87,6 +93,16 @@ fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
     assert!(why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted).contains("another unit"));
     let wanted = TableColumns { wrench_axes: WrenchAxes::Tip, ..usual.clone() };
     assert!(why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted).contains("wrench_axes: tip needs an orientation"));
+    let header = "t_s;x_m;y_m;z_m;qx;qy;qz;qw;fx_n;fy_n;fz_n\n";
+    for (line, word) in [
+        ("0;0,1;0,2;0,3;0;0;0;1;1;2;3\n", "line 2 has a value that is no number"),
+        ("0,5;0.1;0.2;0.3;0;0;0;1;1;2;3\n", "the time in line 2"),
+        ("0;0.1;0.2;0.3;0;0;0;2;1;2;3\n", "the orientation in line 2 has not the length 1"),
+        ("0;0.1;0.2;0.3;0;0;0;1;1;2\n", "line 2 has 10 values for 11 columns"),
+    ] {
+        let text = why(&[header, line].concat(), &usual);
+        assert!(text.contains(word), "{text}");
+    }
     assert!(why("1,2,3\n", &usual).contains("numbers alone"));
     assert!(why("", &usual).contains("empty"));
     assert!(why(&"a".repeat(100_000), &usual).contains("over the limit"));
