@@ -345,10 +345,10 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
     let csv = fs::read_to_string(sweep.path("table.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 3);
-    let first = ["job", "id", "recording", "contact.on_n", "tip.radius_mm"];
-    assert_eq!(rows[0][..5], first);
-    assert_eq!(rows[1][..5], ["0", &*ids[0], "touch.mcap", "0.4", "1.5"]);
-    assert_eq!(rows[2][..5], ["1", &*ids[1], "touch.mcap", "3", "1.5"]);
+    let first = ["job", "id", "recording", "seed", "contact.on_n", "tip.radius_mm", "failed"];
+    assert_eq!(rows[0][..7], first);
+    assert_eq!(rows[1][..7], ["0", &*ids[0], "touch.mcap", "", "0.4", "1.5", ""]);
+    assert_eq!(rows[2][..6], ["1", &*ids[1], "touch.mcap", "", "3", "1.5"]);
     let samples = rows[0].iter().position(|name| *name == "samples").unwrap();
     assert_eq!((rows[1][samples], rows[2][samples]), ("1001", ""));
     let features: Value = serde_json::from_slice(&sweep.result("results", &ids[0])["features.json"]).unwrap();

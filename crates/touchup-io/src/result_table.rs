@@ -54,9 +54,14 @@ pub struct ResultTable {
 }
 
 impl ResultTable {
-    /// No rows yet, and columns that are there whether or not a row has a value for them.
-    pub fn with_columns(names: &[&str]) -> Self {
-        Self { columns: names.iter().map(|name| ((*name).to_owned(), Vec::new())).collect(), rows: 0 }
+    /// No rows yet, and the columns of this one, which are there whether or not any row has a value for them: those of `Null` too.
+    pub fn with_columns_of(row: &[(String, Value)]) -> Self {
+        let mut cells = Vec::new();
+        for (name, value) in row {
+            let value = if value.is_null() { &Value::Bool(false) } else { value };
+            flatten(name, value, &mut cells);
+        }
+        Self { columns: cells.into_iter().map(|(name, _)| (name, Vec::new())).collect(), rows: 0 }
     }
 
     /// A row for each feature; what is nested has its name behind that of what it is in, with `.` between, coordinates `_x`, `_y`, `_z`.
@@ -257,8 +262,9 @@ mod tests {
 
     #[test]
     fn a_column_that_is_named_is_there_without_a_value() {
-        let mut table = ResultTable::with_columns(&["job", "failed"]);
-        table.add_json(&[("job".to_owned(), Value::from(7)), ("failed".to_owned(), Value::Null)]);
+        let row = [("job".to_owned(), Value::from(7)), ("failed".to_owned(), Value::Null)];
+        let mut table = ResultTable::with_columns_of(&row);
+        table.add_json(&row);
         assert_eq!(table.csv(), "job,failed\n7,\n");
         assert_eq!(table.json_rows(), [serde_json::json!({ "job": 7 })]);
         assert!(table.parquet().unwrap().ends_with(b"PAR1"));

@@ -58,6 +58,9 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("two epochs", InputCause::TwoEpochs, |x| x.wrenches(|w| w.stamp_ns -= 1_600_000_000_000_000_000)),
     mistake("stamps of poses zero", InputCause::ZeroStamps, |x| x.poses(|p| p.stamp_ns = 0)),
     mistake("stamps of wrenches zero", InputCause::ZeroStamps, |x| x.wrenches(|w| w.stamp_ns = 0)),
+    mistake("stamps in µs", InputCause::TimeUnit, |x| {
+        x.poses(|p| p.stamp_ns /= 1000).wrenches(|w| w.stamp_ns /= 1000)
+    }),
     mistake("poses at 20 Hz", InputCause::SlowPoses, |x| x.every_pose(25)),
     mistake("scan in mm as inch", InputCause::LengthUnit, |x| x.scan(|p| p * 25.4)),
     mistake("scan in mm as m", InputCause::LengthUnit, |x| x.scan(|p| p * 1e3)),

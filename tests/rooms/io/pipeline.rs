@@ -340,7 +340,7 @@ fn other_parameters_give_another_mesh() {
         &["--tip-radius-mm", "1.4"],
         &["--stiffness-n-per-mm", "10"],
         &["--mode", "paper"],
-        &["--mode", "robust", "--tip-radius-mm", "3"],
+        &["--mode", "robust", "--tip-radius-mm", "1.7"],
     ];
     let mut meshes = BTreeSet::new();
     for flags in what_ifs {

@@ -76,8 +76,8 @@ const LEAST_SUNK: f64 = 0.15e-3;
 /// A force presses straight when the cosine to the scan's normal is larger.
 const STRAIGHT: f64 = 0.8;
 /// The ball is another one when its centre is so many deviations of the scan from where it should be, and surely with so many.
-const DOUBTED_NOISES: f64 = 0.75;
-const SURE_NOISES: f64 = 1.25;
+const DOUBTED_NOISES: f64 = 1.0;
+const SURE_NOISES: f64 = 1.5;
 /// … beyond this share of what the stylus bends by: so far its stiffness may be off.
 const OTHER_SINK: f64 = 0.2;
 /// No scanner is worse, m.
@@ -241,7 +241,8 @@ impl InputJudge<'_> {
         }
         // all as far from the surface as each other: another ball
         let may_be_ball = is_ball && (0.0..LARGEST_BALL * scale.extent).contains(&reported.distance);
-        if !is_on_scan && may_be_ball && reported.scatter <= noise + 0.2 * scale.edge + 0.1e-3 {
+        let is_off = (reported.distance - radius).abs() > tolerance + sunk;
+        if is_off && may_be_ball && reported.scatter <= noise + 0.2 * scale.edge + 0.1e-3 {
             return Some(off_by_radius());
         }
         let shown = |scale: f64| 1e3 * scale;
@@ -450,9 +451,10 @@ impl InputJudge<'_> {
         let scatter = median(&mut distances)?;
         let error = error_of_median(scatter, count);
         // what differs slowly over the scan is seen between the contacts alone
-        let noise = scale.noise.max(self.params.scan_noise).max(SIGMA_OF_MEDIAN * scatter).min(LARGEST_SCAN_NOISE);
+        let roughness = scale.noise.max(SIGMA_OF_MEDIAN * scatter).min(LARGEST_SCAN_NOISE);
+        let noise = roughness.max(self.params.scan_noise.min(LARGEST_SCAN_NOISE));
         // the nearest of what is rough is above its mean
-        let off = (distance + 0.5 * noise - radius).abs() - OTHER_SINK * compliance * levels.largest;
+        let off = (distance + 0.5 * roughness - radius).abs() - OTHER_SINK * compliance * levels.largest;
         let is_doubted = off - 3.0 * error > (DOUBTED_NOISES * noise).max(LEAST_TOLERANCE);
         let is_sure = off - 4.0 * error > (SURE_NOISES * noise).max(2.0 * LEAST_TOLERANCE);
         is_doubted.then(|| InputFinding { is_sure, ..off_by_radius(distance, error, radius) })

@@ -35,9 +35,7 @@ pub struct SweepTables {
 /// # Errors
 /// [`SweepError`]: a line of the plan or a file of a result that cannot be read.
 pub fn tables_of(jobs: &Path, results: &Path, with_features: bool) -> Result<SweepTables, SweepError> {
-    // also where no job failed, or none is simulated
-    let jobs_table = ResultTable::with_columns(&["job", "id", "recording", "seed", "failed"]);
-    let mut tables = SweepTables { jobs: jobs_table, ..SweepTables::default() };
+    let mut tables = SweepTables::default();
     for job in JobsFile::open(jobs)? {
         let job = job?;
         let result = results.join(&job.id);
@@ -50,7 +48,15 @@ pub fn tables_of(jobs: &Path, results: &Path, with_features: bool) -> Result<Swe
         }
         let ResultFiles { failed, summary } = ResultFiles::read(&result)?;
         tables.failed += u64::from(failed.is_some());
-        tables.jobs.add_json(&row_of(&job, failed.as_deref(), summary));
+        let mut row = row_of(&job, failed.as_deref());
+        if tables.jobs.rows() == 0 {
+            // `seed` and `failed` also where no job is simulated, or none failed
+            tables.jobs = ResultTable::with_columns_of(&row);
+        }
+        if let Value::Object(summary) = summary {
+            row.extend(summary);
+        }
+        tables.jobs.add_json(&row);
         if with_features && failed.is_none() {
             for feature in read_features(&result.join(FEATURES))?.features {
                 let mut row = Map::new();
@@ -68,8 +74,8 @@ pub fn tables_of(jobs: &Path, results: &Path, with_features: bool) -> Result<Swe
     Ok(tables)
 }
 
-/// Names and values of a job and of its summary.
-fn row_of(job: &Job, failed: Option<&str>, summary: Value) -> Vec<(String, Value)> {
+/// Names and values of a job, and why it failed.
+fn row_of(job: &Job, failed: Option<&str>) -> Vec<(String, Value)> {
     let text = |name: &str, value: Value| (name.to_owned(), value);
     let mut row = vec![
         text("job", job.job.into()),
@@ -79,8 +85,5 @@ fn row_of(job: &Job, failed: Option<&str>, summary: Value) -> Vec<(String, Value
     ];
     row.extend(job.keys.iter().map(|(key, value)| (key.clone(), value.clone())));
     row.push(text("failed", failed.map_or(Value::Null, Value::from)));
-    if let Value::Object(summary) = summary {
-        row.extend(summary);
-    }
     row
 }
