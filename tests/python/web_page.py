@@ -67,6 +67,8 @@ class Socket:
         # by kind: DEVIATION, SIGMA, OUTLIER; then by vertex
         self.numbers_of = {}
         self.session, self.version, self.vertices, self.faces, self.support = "", 0, {}, {}, {}
+        # session and version, and its triangles then
+        self.known_triangles = None
 
     def take(self, timeout=DEADLINE_S):
         """Takes the next message up."""
