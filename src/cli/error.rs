@@ -69,7 +69,9 @@ impl CliError {
             }
             "input" => Some("touchup doctor SCAN RECORDING says more; --force writes a result all the same"),
             "stopped" => Some("look at the arm and at what is around it; a protective stop is released at its panel"),
-            "scene" => Some("config/default.yaml lists every parameter with its unit and range"),
+            "scene" => Some(
+                "the page \"The scene\" of the documentation (docs/scene.md) lists every parameter with its unit and range",
+            ),
             _ => None,
         };
         Self { kind, message: one_line(&message.to_string()), hint, exit_code }

@@ -29,6 +29,15 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item in items if item not in slow]
 
 
+def pytest_assertrepr_compare(op, left, right):
+    """Where files differ: pytest would show every line of a difference of a megabyte, which takes half an hour."""
+    if op == "==" and isinstance(left, bytes) and isinstance(right, bytes):
+        first = next((place for place, (a, b) in enumerate(zip(left, right, strict=False)) if a != b), min(len(left), len(right)))
+        part = slice(max(first - 20, 0), first + 20)
+        return [f"{len(left)} bytes == {len(right)} bytes", f"first other one at {first}: {left[part]!r} and {right[part]!r}"]
+    return None
+
+
 def pytest_terminal_summary(terminalreporter):
     """Says how many blocks of the documentation ran, where they did."""
     reports = [report for reports in terminalreporter.stats.values() for report in reports]

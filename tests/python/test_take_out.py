@@ -5,8 +5,9 @@ import json
 import numpy
 import pytest
 from part_of_recording import copy_part, ns
-from ros_process import play
+from ros_player import play_in_step
 from test_page import cookie_of, page_of, saved_at_rest
+from test_ros_node import CYCLONE
 from web_page import PageNode, Socket
 
 
@@ -54,8 +55,9 @@ def tap(page, x, y):
 
 @pytest.fixture
 def node(touchup_bin, demo_folder, tmp_path):
-    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", "--web-links") as node:
-        play(touchup_bin, demo_folder / "touch.mcap", "--speed", 8, domain=node.domain)
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", "--web-links", ros=CYCLONE) as node:
+        # all has come when the mesh is saved first
+        play_in_step(node, demo_folder / "touch.mcap", node.domain)
         yield node
 
 

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3::types::{PyDict, PyTuple};
 use touchup::cli::CliError;
-use touchup_core::haptic::{Case, Mismatch};
+use touchup_core::haptic::{Case, Mismatch, RefineCounts};
 use touchup_core::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
 use touchup_session::refinement::{JudgedRefinement, reason_of_refusal};
@@ -167,21 +167,40 @@ impl Pushed {
 /// Refines a scan sample by sample.
 #[pyclass(frozen, subclass, module = "touchup._touchup")]
 pub struct Refiner {
-    /// nothing once it was finished
-    refinement: Mutex<Option<JudgedRefinement>>,
+    stage: Mutex<Stage>,
+}
+
+/// How far it is.
+enum Stage {
+    Open(Box<JudgedRefinement>),
+    /// what had become of the samples
+    Finished(RefineCounts),
+}
+
+impl Stage {
+    fn open(&mut self) -> Option<&mut JudgedRefinement> {
+        if let Self::Open(refinement) = self { Some(refinement) } else { None }
+    }
+
+    fn counts(&self) -> RefineCounts {
+        match self {
+            Self::Open(refinement) => *refinement.refinement.engine.refiner().counts(),
+            Self::Finished(counts) => *counts,
+        }
+    }
 }
 
 impl Refiner {
     /// Another thread may be at work, which needs the interpreter for nothing.
-    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Option<JudgedRefinement>> {
-        match self.refinement.try_lock() {
+    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Stage> {
+        match self.stage.try_lock() {
             Ok(guard) => guard,
-            Err(_) => self.refinement.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
+            Err(_) => self.stage.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
         }
     }
 
     fn in_use<T>(&self, py: Python<'_>, with: impl FnOnce(&mut JudgedRefinement) -> PyResult<T>) -> PyResult<T> {
-        match self.locked(py).as_mut() {
+        match self.locked(py).open() {
             Some(refinement) => with(refinement),
             None => Err(exception(py, finished())),
         }
@@ -246,7 +265,7 @@ impl Refiner {
         let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
         let refinement = at_work(py, || refinement(scan, &scene, frame))?;
-        Ok(Self { refinement: Mutex::new(Some(refinement)) })
+        Ok(Self { stage: Mutex::new(Stage::Open(refinement.into())) })
     }
 
     /// Takes the next sample and moves the mesh by it.
@@ -289,10 +308,10 @@ impl Refiner {
             // while the interpreter is held, so that no thread of it writes to the arrays
             chunk.clear();
             chunk.extend(rows.part(begin..rows.len().min(begin + CHUNK)));
-            let (refinement, pushed, chunk) = (&self.refinement, &mut pushed, &chunk);
+            let (stage, pushed, chunk) = (&self.stage, &mut pushed, &chunk);
             let is_open = py.detach(move || {
-                let mut refinement = refinement.lock().unwrap_or_else(PoisonError::into_inner);
-                let Some(refinement) = refinement.as_mut() else { return false };
+                let mut stage = stage.lock().unwrap_or_else(PoisonError::into_inner);
+                let Some(refinement) = stage.open() else { return false };
                 chunk.iter().for_each(|sample| pushed.push(refinement, sample));
                 true
             });
@@ -329,15 +348,21 @@ impl Refiner {
         Ok(into)
     }
 
-    /// What became of the samples so far, by name.
+    /// What became of the samples so far, by name; also once it is finished.
     fn _counts(&self, py: Python<'_>) -> PyResult<String> {
-        let counts = self.in_use(py, |refinement| Ok(*refinement.refinement.engine.refiner().counts()))?;
-        crate::arrays::json(&counts).map_err(|error| exception(py, error))
+        crate::arrays::json(&self.locked(py).counts()).map_err(|error| exception(py, error))
     }
 
     /// Reconstructs what was touched; the refiner takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
-        let refinement = self.locked(py).take().ok_or_else(|| exception(py, finished()))?;
+        let refinement = {
+            let mut stage = self.locked(py);
+            let counts = stage.counts();
+            match std::mem::replace(&mut *stage, Stage::Finished(counts)) {
+                Stage::Open(refinement) => *refinement,
+                Stage::Finished(_) => return Err(exception(py, finished())),
+            }
+        };
         at_work(py, || finish_refinement(refinement, force))?.into_dict(py)
     }
 }

@@ -90,8 +90,10 @@ def test_events_tell_when_contact_begins_and_ends():
 def test_a_finished_refiner_takes_no_more():
     refiner, _ = pushed_one_by_one(slide(0.1e-3, count=300))
     mesh = refiner.mesh
+    counts = refiner.counts
     finished = refiner.finish()
     assert np.array_equal(finished.mesh.vertices, mesh.vertices) and finished.mesh.support is None
+    assert refiner.counts == counts
     with pytest.raises(touchup.TouchupError, match="finished"):
         refiner.push(10**12, (0, 0, 0), (0, 0, 0, 1), (0, 0, 1))
 

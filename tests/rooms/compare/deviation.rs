@@ -233,7 +233,7 @@ fn what_is_no_number_or_no_mesh_is_refused() {
     let tree = FaceTree::new(&mesh);
     let bad = [Point3::origin(), Point3::new(0.0, f64::INFINITY, 0.0)];
     assert_eq!(deviations(&bad, &mesh, &tree, &Alone), Err(CompareError::NotFinite { point: 1 }));
-    assert_eq!(cloud_distances(&bad, &bad[..1]), Err(CompareError::NotFinite { point: 1 }));
+    assert_eq!(cloud_distances(&bad, &bad[..1], &Alone), Err(CompareError::NotFinite { point: 1 }));
     let empty = TriMesh::new(vec![Point3::origin()], vec![]).unwrap();
     let nothing = FaceTree::new(&empty);
     assert_eq!(deviations(&bad[..1], &empty, &nothing, &Alone), Err(CompareError::NoFaces));

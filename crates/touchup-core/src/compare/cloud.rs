@@ -4,15 +4,28 @@ use nalgebra::Point3;
 
 use super::CompareError;
 use super::deviation::check_finite;
-use crate::mesh::{PointTree, coherent_order};
+use crate::mesh::{PointTree, Workers, coherent_order, map_pieces_by};
+
+/// Neighbours that are searched for one after the other.
+const RUN: usize = 1024;
+/// Runs that are worth a thread.
+const FEWEST_RUNS: usize = 4;
+/// By what a bound on a distance is widened, so that no rounding shuts out the point it comes from.
+const WIDENED: f64 = 1.0 + 1e-9;
 
 /// Distance from each of `points` to the nearest point of `cloud`, m.
 ///
 /// It is the distance of the surfaces only where the cloud is dense against it: half the spacing is in it.
 ///
+/// - `workers`: threads that search; the distances are the same to the last bit.
+///
 /// # Errors
 /// [`CompareError::NotFinite`] of either; [`CompareError::NoPoints`], [`CompareError::TooManyPoints`].
-pub fn cloud_distances(points: &[Point3<f64>], cloud: &[Point3<f64>]) -> Result<Vec<f64>, CompareError> {
+pub fn cloud_distances(
+    points: &[Point3<f64>],
+    cloud: &[Point3<f64>],
+    workers: &dyn Workers,
+) -> Result<Vec<f64>, CompareError> {
     check_finite(points)?;
     check_finite(cloud)?;
     if cloud.len() > PointTree::MOST_POINTS {
@@ -22,28 +35,60 @@ pub fn cloud_distances(points: &[Point3<f64>], cloud: &[Point3<f64>]) -> Result<
         return Err(CompareError::NoPoints);
     }
     let tree = PointTree::new(cloud);
+    let order = coherent_order(points);
+    let runs: Vec<&[u32]> = order.chunks(RUN).collect();
+    let found = map_pieces_by(workers, runs.len(), FEWEST_RUNS, |run| run_distances(points, runs[run], cloud, &tree));
     let mut distances = vec![f64::INFINITY; points.len()];
-    for at in coherent_order(points) {
-        let p = &points[at as usize];
-        if let Some((nearest, _)) = tree.nearest(p, 1, f64::INFINITY).next() {
-            distances[at as usize] = (p - cloud[nearest]).norm();
-        }
-    }
+    order.iter().zip(found.into_iter().flatten()).for_each(|(&at, distance)| distances[at as usize] = distance);
     Ok(distances)
+}
+
+/// Those of a run of neighbours, in its order. The nearest point of one is no farther from the next than its own nearest: from far away, where
+/// all points of a cloud are about equally near, that leaves few to be looked at.
+fn run_distances(points: &[Point3<f64>], run: &[u32], cloud: &[Point3<f64>], tree: &PointTree) -> Vec<f64> {
+    let mut last: Option<usize> = None;
+    let distance = |at: &u32| {
+        let p = &points[*at as usize];
+        let bound = last.map_or(f64::INFINITY, |near| (p - cloud[near]).norm() * WIDENED + tree.resolution());
+        last = tree.nearest(p, 1, bound).next().map(|(near, _)| near);
+        last.map_or(f64::INFINITY, |near| (p - cloud[near]).norm())
+    };
+    run.iter().map(distance).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Alone;
 
     #[test]
     fn the_nearest_of_a_lattice_is_found_also_from_far_away() {
         let lattice: Vec<_> =
             (0..1000).map(|i| Point3::new((i % 10).into(), (i / 10 % 10).into(), (i / 100).into())).collect();
         let points = [Point3::new(3.1, 4.0, 5.0), Point3::new(-3.0, 0.0, 4.0), Point3::new(9.0, 9.0, 109.0)];
-        let found = cloud_distances(&points, &lattice).unwrap();
+        let found = cloud_distances(&points, &lattice, &Alone).unwrap();
         for (found, by_hand) in found.iter().zip([0.1, 3.0, 100.0]) {
             assert!((found - by_hand).abs() < 1e-12, "{found}");
+        }
+    }
+
+    /// More than one run, near, on and far beside the cloud: against every distance.
+    #[test]
+    fn many_points_have_the_distances_that_all_pairs_give() {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut spread = |count: usize, low: f64| -> Vec<Point3<f64>> {
+            (0..count).map(|_| Point3::new(low + random(), random(), 0.1 * random())).collect()
+        };
+        let cloud = spread(500, 0.0);
+        let points = [spread(1500, 0.0), cloud.clone(), spread(1500, 40.0)].concat();
+        let found = cloud_distances(&points, &cloud, &Alone).unwrap();
+        for (p, found) in points.iter().zip(found) {
+            let by_hand = cloud.iter().map(|near| (p - near).norm()).fold(f64::INFINITY, f64::min);
+            assert!((found - by_hand).abs() < 1e-12, "{p}: {found} and {by_hand}");
         }
     }
 
@@ -51,7 +96,7 @@ mod tests {
     fn points_closer_than_the_tree_can_halve_are_no_trouble() {
         let x = 0.1_f64;
         let cloud: Vec<_> = (0..40).map(|i| Point3::new(if i % 2 == 0 { x } else { x.next_up() }, 0.0, 0.0)).collect();
-        assert_eq!(cloud_distances(&[Point3::new(x, 1.0, 0.0)], &cloud).unwrap(), [1.0]);
-        assert_eq!(cloud_distances(&[Point3::origin()], &[]), Err(CompareError::NoPoints));
+        assert_eq!(cloud_distances(&[Point3::new(x, 1.0, 0.0)], &cloud, &Alone).unwrap(), [1.0]);
+        assert_eq!(cloud_distances(&[Point3::origin()], &[], &Alone), Err(CompareError::NoPoints));
     }
 }

@@ -217,7 +217,7 @@ fn measure(
         regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
     };
     let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
-        Ok(Sorted { values: cloud_distances(points, cloud)?, regions: like.regions.clone() })
+        Ok(Sorted { values: cloud_distances(points, cloud, workers)?, regions: like.regions.clone() })
     };
     let cloud_to_truth = cloud(&mesh_points, &truth_points, &to_truth)?;
     let truth_to_cloud = cloud(&truth_points, &mesh_points, &to_mesh)?;

@@ -463,6 +463,7 @@ impl InputJudge<'_> {
     fn judge_clock(&self) -> Option<InputFinding> {
         let ClockOffset { offset, sigma, drift, evidence } = self.clock?;
         let largest = drift.map_or(offset.abs(), |of| of.offset_at_first.abs().max(of.offset_at_last.abs()));
+        let sigma = drift.map_or(sigma, |of| of.sigma_at_ends(sigma));
         let path = (largest - 3.0 * sigma) * USUAL_SPEED;
         let [ms, sigma_ms] = [offset, sigma].map(|x| x * 1e3);
         let (measured, remedy) = match drift {

@@ -29,5 +29,5 @@ pub(crate) use signed_distance::corner_normal;
 pub use signed_distance::{is_on_rim, pseudo_normal, signed_distance};
 pub use simplified::Simplified;
 pub use tri_mesh::{FARTHEST, MeshError, TriMesh, is_place};
-pub(crate) use workers::map_by;
 pub use workers::{Alone, Job, Workers};
+pub(crate) use workers::{map_by, map_pieces_by};

@@ -49,6 +49,11 @@ impl PointTree {
         Self { tree: KDTree::new(&cloud), low, steps }
     }
 
+    /// By how much the distance of a point may be off in the tree, m: each of both points by a step along each axis.
+    pub fn resolution(&self) -> f64 {
+        2.0 * 3.0_f64.sqrt() / self.steps
+    }
+
     /// The nearest `count` points within `radius` of `p`, nearest first: the index of each and its distance, m.
     ///
     /// - `p`: finite; `radius`: m, may be infinite.

@@ -32,7 +32,17 @@ const LEAST_PIECE: usize = 4_000;
 
 /// What `each` makes of 0 to `count` − 1, in this order, for any workers.
 pub(crate) fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let pieces = workers.count().min(count / LEAST_PIECE).max(1);
+    map_pieces_by(workers, count, LEAST_PIECE, each)
+}
+
+/// As [`map_by`], of items of which `least` are worth a thread.
+pub(crate) fn map_pieces_by<T: Send>(
+    workers: &dyn Workers,
+    count: usize,
+    least: usize,
+    each: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
+    let pieces = workers.count().min(count / least).max(1);
     if pieces == 1 {
         return (0..count).map(each).collect();
     }

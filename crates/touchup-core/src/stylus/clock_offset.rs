@@ -30,6 +30,26 @@ pub struct ClockDrift {
     pub offset_at_last: f64,
 }
 
+impl ClockDrift {
+    /// Standard uncertainty of [`Self::offset_at_first`] and [`Self::offset_at_last`], s: of an offset in the middle between them, and of a rate
+    /// over half the time, which are independent there: u² = σ² + (σ_rate T/2)².
+    ///
+    /// - `sigma`: that of the offset in the middle, s.
+    ///
+    /// ```
+    /// use touchup_core::stylus::ClockDrift;
+    ///
+    /// // a straight line through equally good values over 60 s: twice as uncertain at its ends as in the middle
+    /// let (sigma, rate_sigma) = (1e-4, 12f64.sqrt() * 1e-4 / 60.0);
+    /// let drift = ClockDrift { rate: -5e-5, rate_sigma, offset_at_first: 2e-3, offset_at_last: -1e-3 };
+    /// assert!((drift.sigma_at_ends(sigma) - 2.0 * sigma).abs() < 1e-12);
+    /// ```
+    pub fn sigma_at_ends(&self, sigma: f64) -> f64 {
+        let half = (self.offset_at_last - self.offset_at_first) / (2.0 * self.rate);
+        sigma.hypot(self.rate_sigma * half)
+    }
+}
+
 /// What a delay is estimated from.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -89,8 +89,10 @@ impl SegmentedWriter {
         self.end_segment()?;
         let segment = FileSegment::begin(self.segments.len(), stamp_ns);
         let path = self.folder.join(&segment.name);
-        let file = File::create_new(&path).map_err(|source| RecordingError::Io { path, source })?;
-        self.current = Some(RecordingWriter::new(BufWriter::new(file), &self.topics)?);
+        let file = File::create_new(&path).map_err(|source| RecordingError::Io { path: path.clone(), source })?;
+        let begun = RecordingWriter::new(BufWriter::new(file), &self.topics);
+        // a full disk takes a file and not its first bytes: an empty one would be in the way of the next for ever
+        self.current = Some(begun.inspect_err(|_| drop(std::fs::remove_file(&path)))?);
         self.segments.push(segment);
         Ok(())
     }
@@ -138,8 +140,11 @@ impl SegmentedWriter {
     /// After an error: leaves of the file what was flushed, and nothing of one that was not. What is written next begins
     /// another. Returns how many messages are lost.
     pub fn give_up_segment(&mut self) -> u64 {
+        // where none was begun, those before it stay
+        let Some(writer) = self.current.take() else { return 0 };
         // tries once more to write what it holds
-        let Some(segment) = self.current.take().and(self.segments.pop()) else { return 0 };
+        drop(writer);
+        let Some(segment) = self.segments.pop() else { return 0 };
         let path = self.folder.join(&segment.name);
         let flushed = std::mem::take(&mut self.flushed_length);
         // where even that is refused, the file's end is one that a reader passes over

@@ -118,7 +118,7 @@ class Refiner(_touchup.Refiner):
 
     @property
     def counts(self) -> dict[str, int]:
-        """What became of the samples so far: `accepted`, `contacts`, `moved`, `cut_back`, `light`, `out_of_reach`, …"""
+        """What became of the samples so far, also after `finish`: `accepted`, `contacts`, `moved`, `cut_back`, `light`, `out_of_reach`, …"""
         counted: dict[str, int] = json.loads(self._counts())
         return counted
 

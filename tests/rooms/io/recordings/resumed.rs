@@ -55,3 +55,25 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
         assert_eq!(fs::read_dir(&recording).unwrap().count(), 0);
     }
 }
+
+/// A file that could not be begun, as on a full disk, takes none of those before it along: what comes when there is room goes behind them.
+#[test]
+fn a_file_that_could_not_be_begun_takes_no_other_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let (messages, topics) = (touch(60), Topics::default());
+    let mut writer = SegmentedWriter::new(folder.path(), &topics);
+    write(&mut writer, &messages[..20]);
+    assert_eq!((writer.flush().unwrap(), writer.give_up_segment()), (20, 0));
+    // in the way, like a disk that takes no file
+    let next = folder.path().join("touch_0001.mcap");
+    fs::create_dir(&next).unwrap();
+    for refused in &messages[20..23] {
+        assert!(writer.write(refused, FRAMES[0]).is_err());
+        assert_eq!(writer.give_up_segment(), 0);
+    }
+    fs::remove_dir(&next).unwrap();
+    write(&mut writer, &messages[23..]);
+    writer.finish().unwrap();
+    let kept = [&messages[..20], &messages[23..]].concat();
+    assert_eq!(read_all(folder.path(), &topics), kept);
+}
