@@ -44,7 +44,7 @@ pub fn cloud_distances(
 }
 
 /// Those of a run of neighbours, in its order. The nearest point of one is no farther from the next than its own nearest: from far away, where
-/// all points of a cloud are about equally near, that leaves few to be looked at.
+/// many points of a cloud are about equally near, that leaves fewer to be looked at.
 fn run_distances(points: &[Point3<f64>], run: &[u32], cloud: &[Point3<f64>], tree: &PointTree) -> Vec<f64> {
     let mut last: Option<usize> = None;
     let distance = |at: &u32| {
