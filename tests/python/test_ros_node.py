@@ -282,8 +282,8 @@ def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(de
         with Node(touchup_bin, disk, "--scene", scene, domain=domain, ros=CYCLONE) as node:
             recording = first_seconds(demo_folder / "touch.mcap", 20, tmp_path / "part.mcap")
             steps = in_step(node, recording, domain)
-            # several times what the disk holds
-            for _ in itertools.islice(steps, 150):
+            # twice what the disk holds
+            for _ in itertools.islice(steps, 300):
                 pass
             node.wait_for(lambda: "does not record, make room on the disk" in node.text())
             # not a byte is left, only names: it tries to begin a file, and cannot

@@ -167,17 +167,17 @@ impl Pushed {
 /// Refines a scan sample by sample.
 #[pyclass(frozen, subclass, module = "touchup._touchup")]
 pub struct Refiner {
-    stage: Mutex<Stage>,
+    state: Mutex<RefinerState>,
 }
 
 /// How far it is.
-enum Stage {
+enum RefinerState {
     Open(Box<JudgedRefinement>),
     /// what had become of the samples
     Finished(RefineCounts),
 }
 
-impl Stage {
+impl RefinerState {
     fn open(&mut self) -> Option<&mut JudgedRefinement> {
         if let Self::Open(refinement) = self { Some(refinement) } else { None }
     }
@@ -192,10 +192,10 @@ impl Stage {
 
 impl Refiner {
     /// Another thread may be at work, which needs the interpreter for nothing.
-    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, Stage> {
-        match self.stage.try_lock() {
+    fn locked(&self, py: Python<'_>) -> MutexGuard<'_, RefinerState> {
+        match self.state.try_lock() {
             Ok(guard) => guard,
-            Err(_) => self.stage.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
+            Err(_) => self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
         }
     }
 
@@ -265,7 +265,7 @@ impl Refiner {
         let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
         let refinement = at_work(py, || refinement(scan, &scene, frame))?;
-        Ok(Self { stage: Mutex::new(Stage::Open(refinement.into())) })
+        Ok(Self { state: Mutex::new(RefinerState::Open(refinement.into())) })
     }
 
     /// Takes the next sample and moves the mesh by it.
@@ -308,10 +308,10 @@ impl Refiner {
             // while the interpreter is held, so that no thread of it writes to the arrays
             chunk.clear();
             chunk.extend(rows.part(begin..rows.len().min(begin + CHUNK)));
-            let (stage, pushed, chunk) = (&self.stage, &mut pushed, &chunk);
+            let (state, pushed, chunk) = (&self.state, &mut pushed, &chunk);
             let is_open = py.detach(move || {
-                let mut stage = stage.lock().unwrap_or_else(PoisonError::into_inner);
-                let Some(refinement) = stage.open() else { return false };
+                let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+                let Some(refinement) = state.open() else { return false };
                 chunk.iter().for_each(|sample| pushed.push(refinement, sample));
                 true
             });
@@ -356,11 +356,11 @@ impl Refiner {
     /// Reconstructs what was touched; the refiner takes no more samples.
     fn _finish<'py>(&self, py: Python<'py>, force: bool) -> PyResult<Bound<'py, PyDict>> {
         let refinement = {
-            let mut stage = self.locked(py);
-            let counts = stage.counts();
-            match std::mem::replace(&mut *stage, Stage::Finished(counts)) {
-                Stage::Open(refinement) => *refinement,
-                Stage::Finished(_) => return Err(exception(py, finished())),
+            let mut state = self.locked(py);
+            let counts = state.counts();
+            match std::mem::replace(&mut *state, RefinerState::Finished(counts)) {
+                RefinerState::Open(refinement) => *refinement,
+                RefinerState::Finished(_) => return Err(exception(py, finished())),
             }
         };
         at_work(py, || finish_refinement(refinement, force))?.into_dict(py)

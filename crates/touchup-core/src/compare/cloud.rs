@@ -58,6 +58,9 @@ fn run_distances(points: &[Point3<f64>], run: &[u32], cloud: &[Point3<f64>], tre
 
 #[cfg(test)]
 mod tests {
+    use rand_distr::{Distribution, StandardUniform};
+    use rand_pcg::Pcg64;
+
     use super::*;
     use crate::mesh::Alone;
 
@@ -75,11 +78,8 @@ mod tests {
     /// More than one run, near, on and far beside the cloud: against every distance.
     #[test]
     fn many_points_have_the_distances_that_all_pairs_give() {
-        let mut state = 1_u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let mut rng = Pcg64::new(1, 1);
+        let mut random = || -> f64 { StandardUniform.sample(&mut rng) };
         let mut spread = |count: usize, low: f64| -> Vec<Point3<f64>> {
             (0..count).map(|_| Point3::new(low + random(), random(), 0.1 * random())).collect()
         };
